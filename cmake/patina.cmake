@@ -1,0 +1,69 @@
+# What every target of patina shares: language level, warnings, optimisation, third-party packages, and the
+# functions that declare a library folder, its tests and its benchmarks.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}")
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+find_program(PATINA_CCACHE ccache)
+if(PATINA_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${PATINA_CCACHE}")
+endif()
+
+find_package(Threads REQUIRED)
+find_package(TBB REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(embree 3 REQUIRED)
+find_package(Torch REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO) # its CMake package wants its command-line tools too
+pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebp libwebpmux)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+if(PATINA_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+endif()
+if(PATINA_BUILD_BENCH)
+  find_package(benchmark REQUIRED)
+endif()
+
+add_library(patina_options INTERFACE)
+target_include_directories(patina_options INTERFACE "${CMAKE_SOURCE_DIR}/src")
+target_compile_options(patina_options INTERFACE
+  -march=${PATINA_ARCH} -Wall -Wextra -Wpedantic -Wshadow $<$<BOOL:${PATINA_WERROR}>:-Werror>)
+target_compile_definitions(patina_options INTERFACE GLM_FORCE_SILENT_WARNINGS GLM_ENABLE_EXPERIMENTAL
+  PATINA_VERSION="${PROJECT_VERSION}")
+
+# Third-party headers are system headers: their warnings are not ours.
+add_library(patina_torch INTERFACE)
+target_link_libraries(patina_torch INTERFACE ${TORCH_LIBRARIES})
+target_include_directories(patina_torch SYSTEM INTERFACE ${TORCH_INCLUDE_DIRS})
+
+# patina_library(<folder> SOURCES <files> [DEPS <folders>] [PACKAGES <third-party targets>])
+# One static library a folder of src/patina; DEPS repeats the layering rule of docs/architecture.md.
+function(patina_library folder)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PACKAGES" ${ARGN})
+  add_library(patina_${folder} STATIC ${ARG_SOURCES})
+  list(TRANSFORM ARG_DEPS PREPEND patina_)
+  target_link_libraries(patina_${folder} PUBLIC patina_options ${ARG_DEPS} ${ARG_PACKAGES} Threads::Threads)
+endfunction()
+
+# patina_program(<name> SOURCES <files> DEPS <folders> [PACKAGES <targets>]): an executable in the build folder's root.
+function(patina_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PACKAGES" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  list(TRANSFORM ARG_DEPS PREPEND patina_)
+  target_link_libraries(${name} PRIVATE patina_options ${ARG_DEPS} ${ARG_PACKAGES})
+endfunction()
+
+# patina_test(<folder> SOURCES <files> DEPS <folders> [PACKAGES <targets>]): one test program a folder, test_<folder>.
+function(patina_test folder)
+  patina_program(test_${folder} ${ARGN})
+  target_link_libraries(test_${folder} PRIVATE patina_test_support GTest::gtest GTest::gtest_main)
+  add_test(NAME ${folder} COMMAND test_${folder} WORKING_DIRECTORY "${CMAKE_SOURCE_DIR}")
+endfunction()

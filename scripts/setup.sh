@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Installs everything patina builds and runs with, from Debian 12's own packages. Safe to run again: it
+# asks dpkg first and touches the network only when something is missing.
+#   scripts/setup.sh            what `make build`, `make demo` and `make check` need
+#   scripts/setup.sh --bench    the peers of the benchmarks as well (Blender)
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build ccache git ca-certificates
+  libtorch-dev libopenblas0-pthread   # networks; without OpenBLAS matrix products fall to 5 GFLOP/s
+  libembree-dev libtbb-dev            # ray casting, threads
+  libopenimageio-dev libwebp-dev      # image files, animated turntables
+  nlohmann-json3-dev libglm-dev libcli11-dev libspdlog-dev libxxhash-dev
+  libgtest-dev libbenchmark-dev
+)
+if [[ "${1:-}" == "--bench" ]]; then packages+=(blender); fi
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
+done
+if ((${#missing[@]} == 0)); then exit 0; fi
+
+as_root=()
+if [[ "$(id -u)" -ne 0 ]]; then
+  command -v sudo >/dev/null || {
+    echo "setup: missing packages: ${missing[*]}" >&2
+    echo "setup: run as root, or install sudo, or ask your administrator for these packages" >&2
+    exit 1
+  }
+  as_root=(sudo)
+fi
+echo "setup: installing ${missing[*]}"
+export DEBIAN_FRONTEND=noninteractive
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" apt-get install -y --no-install-recommends "${missing[@]}"

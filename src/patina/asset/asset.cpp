@@ -1,0 +1,1 @@
+#include "patina/asset/asset.h"

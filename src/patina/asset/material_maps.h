@@ -1,0 +1,83 @@
+// Material maps: what a material is worth at every texel, factors multiplied in, linear. The renderer reads them, inverse
+// rendering changes them, export writes them back.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "patina/asset/asset.h"
+
+namespace patina::asset {
+
+/// One map and where it lies: texel values are *effective* (factor × texture) and linear.
+/// A slot with no texture is a map of 1 × 1 texel.
+struct Map {
+  Image texels;
+  int uv_set = 0;
+  mat3 uv_transform{1.0f};
+  Wrap wrap_s = Wrap::kRepeat;
+  Wrap wrap_t = Wrap::kRepeat;
+};
+
+struct MaterialMaps {
+  std::string name;
+  Map base_color;  // [3] linear Rec. 709, [0,1]
+  Map alpha;       // [1] [0,1]
+  Map roughness;   // [1] perceptual roughness, [0,1]
+  Map metallic;    // [1] [0,1]
+  Map normal;      // [3] unit vectors in tangent space, z > 0; (0,0,1) where there is no normal map
+  Map emission;    // [3] linear, W/m²/sr
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  float alpha_cutoff = 0.5f;
+  bool double_sided = false;
+};
+
+/// One entry a material of the asset, in order.
+std::vector<MaterialMaps> resolve_materials(const Asset& asset);
+
+/// `uv` as the mesh has it → the map's own UV (transform applied, not wrapped).
+inline vec2 map_uv(const Map& map, const vec2& uv) { return vec2(map.uv_transform * vec3(uv, 1.0f)); }
+
+/// The four texels and weights of a bilinear look-up at `uv_map` (from map_uv), wrap modes applied. Indices are pixel
+/// offsets y·width + x, weights sum to one: the same look-up serves reading and splatting gradients.
+struct BilinearTap {
+  std::array<int, 4> texel;
+  std::array<float, 4> weight;
+};
+BilinearTap bilinear_tap(const Map& map, const vec2& uv_map);
+
+/// Bilinear value of a map with 1 or 3 channels.
+float sample1(const Map& map, const vec2& uv_map);
+vec3 sample3(const Map& map, const vec2& uv_map);
+
+/// `map` resampled to width × height texels (area-averaged down, bilinear up, wrap modes honoured; normals renormalised by the caller).
+Map resized(const Map& map, int width, int height);
+
+/// Which maps of a material were changed and shall be written.
+struct ChangedMaps {
+  bool base_color = false, roughness = false, metallic = false, normal = false;
+  bool any() const { return base_color || roughness || metallic || normal; }
+};
+
+/// Writes the asset with the changed maps of its materials to `path` (.glb, .gltf or .obj by extension; textures of .gltf
+/// and .obj beside it). maps and changed have one entry a material. Materials without a change, and every other byte of
+/// JSON and buffers (extensions, extras, animation, skins, names), are carried over as they were. Packed channels
+/// (occlusion), samplers, texture transforms and texCoord are kept; images shared with an unchanged slot are copied
+/// first. Atomic: the old file or the whole new one. Throws Error{kIo, kUnsupported}.
+void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::span<const ChangedMaps> changed,
+                  const std::filesystem::path& path);
+
+/// What `patina info` tells of the UVs of one material; texel figures on a 1024² raster of the unit tile (UVs wrapped).
+struct UvState {
+  bool missing = false;            // some primitive has no TEXCOORD_0
+  float covered = 0;               // share of the tile that some triangle covers
+  float overlapping = 0;           // share of the covered texels that more than one triangle covers
+  float mirrored = 0;              // share of triangles in the minority winding
+  float zero_area = 0;             // share of triangles without UV area
+  vec2 min{0.0f}, max{0.0f};       // range before wrapping
+};
+std::vector<UvState> uv_states(const Asset& asset);
+
+}  // namespace patina::asset

@@ -1,0 +1,1 @@
+#include "patina/attention/attention.h"

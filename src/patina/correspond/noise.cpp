@@ -1,0 +1,1 @@
+#include "patina/correspond/noise.h"

@@ -1,0 +1,45 @@
+// The initial latent noise of all views, integrated from one white-noise field that lives on the surface [Hadadan2025, Sec. 4.2].
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "patina/base/progress.h"
+#include "patina/render/scene.h"
+
+namespace patina::correspond {
+
+enum class NoiseMode {
+  kIndependent,  // white noise, no relation between views
+  kPaper,        // 4 × 4 point samples of a 1024² field [Hadadan2025]
+  kExact,        // the footprint integrated exactly over the field's texels
+};
+
+/// Noise of a whole view grid, ready for the sampler. values [4, height, width] f32, zero mean and unit variance.
+struct NoiseField {
+  int width = 0, height = 0;   // latent pixels of the whole grid
+  std::vector<float> values;
+};
+
+struct NoiseOptions {
+  NoiseMode mode = NoiseMode::kExact;
+  int field_size = 1024;       // M: texels a side of the field, a unit of UV
+  uint64_t seed = 0;
+};
+
+/// cameras: grid × grid views; latent_scale: image pixels a latent pixel (8 for Stable Diffusion). Each view's
+/// width and height must be divisible by it.
+NoiseField make_noise(const render::Scene& scene, std::span<const render::Camera> cameras, int latent_scale,
+                      const NoiseOptions& options, const Progress& progress = {});
+
+/// Whiteness of one view's noise [4,h,w]: what DESIGN demands of it.
+struct NoiseStatistics {
+  float mean = 0, variance = 0;
+  float autocorrelation_x = 0, autocorrelation_y = 0;  // lag 1
+  float kolmogorov_smirnov_p = 0;                      // p-value against N(0,1)
+};
+/// One entry a view of the grid.
+std::vector<NoiseStatistics> noise_statistics(const NoiseField& noise, int grid);
+
+}  // namespace patina::correspond

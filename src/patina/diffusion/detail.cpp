@@ -1,0 +1,1 @@
+#include "patina/diffusion/detail.h"

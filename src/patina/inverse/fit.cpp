@@ -1,0 +1,1 @@
+#include "patina/inverse/fit.h"

@@ -1,0 +1,1 @@
+#include "patina/base/error.h"

@@ -1,0 +1,38 @@
+// Light from infinitely far away: an equirectangular HDR map with importance sampling, or a constant.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "patina/image/image.h"
+
+namespace patina::render {
+
+/// Direction ↔ map: the map's centre column looks along -Z, its right half toward +X, its top row at +Y, as glTF viewers and Blender show it.
+class Environment {
+ public:
+  /// radiance [H,W,3] linear, non-negative, finite, W/m²/sr per unit; builds the sampling tables. Throws Error{kFormat}.
+  explicit Environment(Image radiance);
+
+  vec3 radiance(const vec3& direction) const;   // bilinear, wraps in azimuth
+  struct Sample {
+    vec3 direction;
+    vec3 radiance;
+    float pdf;  // per steradian, > 0
+  };
+  Sample sample(const vec2& u) const;
+  float pdf(const vec3& direction) const;
+  const Image& map() const { return radiance_; }
+
+ private:
+  Image radiance_;
+  std::vector<float> marginal_cdf_, conditional_cdf_;
+  double total_ = 0;
+};
+
+/// The built-in studio: soft key, fill and rim boxes over a grey dome, lit for materials; made by formula, so no file is needed.
+Environment studio_environment();
+Environment constant_environment(const vec3& radiance);
+Environment read_environment(const std::filesystem::path& path);
+
+}  // namespace patina::render

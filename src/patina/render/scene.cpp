@@ -1,0 +1,1 @@
+#include "patina/render/scene.h"

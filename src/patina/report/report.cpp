@@ -1,0 +1,1 @@
+#include "patina/report/report.h"

@@ -1,0 +1,60 @@
+// The report of a run: one self-contained HTML page, contact sheets, a loss curve, and a turntable.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "patina/base/progress.h"
+#include "patina/image/image.h"
+#include "patina/render/scene.h"
+
+namespace patina::report {
+
+/// Images side by side, `columns` a row, on a neutral ground, scaled to `tile_width` pixels. [H,W,3] sRGB.
+Image contact_sheet(std::span<const Image> images, int columns, int tile_width);
+
+/// Share of high-frequency energy kept: energy above `cutoff` cycles/pixel of `image` over that of `reference`, luminance,
+/// weighted by mask [H,W,1]; 1 means as sharp.
+float sharpness_kept(const Image& image, const Image& reference, const Image& mask);
+
+/// Peak signal-to-noise ratio in dB over pixels weighted by `mask` ([H,W,1] or empty), peak 1. Infinity when equal.
+float psnr(const Image& a, const Image& b, const Image& mask = {});
+
+struct TexturePair {
+  std::string material, slot;    // "base colour", "normal", "roughness", "metallic"
+  Image before, after;           // as they are shown: sRGB or encoded normal, [0,1]
+};
+
+struct ReportData {
+  std::string title;                          // asset file name
+  std::string prompt, negative_prompt;
+  std::vector<Image> before, edited, after;   // one a view, sRGB
+  std::vector<TexturePair> textures;
+  std::vector<float> loss;
+  nlohmann::json config, metrics;
+  std::vector<std::string> warnings;
+  std::filesystem::path turntable;            // relative to the page; empty: none (embedded as data)
+};
+
+/// Writes report.html: everything inside it (images as data URIs), readable without network, light and dark, prints well.
+void write_report(const std::filesystem::path& path, const ReportData& data);
+
+/// Renders `frames` views around the asset and writes an animated WebP, before and after side by side.
+struct TurntableOptions {
+  int frames = 24;
+  int resolution = 256;
+  int samples_per_pixel = 16;
+  float exposure_ev = 0;
+  float seconds = 4;
+};
+void write_turntable(const std::filesystem::path& path, const render::Scene& before, const render::Scene& after,
+                     std::span<const render::Camera> cameras, const TurntableOptions& options, const Progress& progress);
+
+/// Writes frames ([H,W,3] sRGB, one size) as an endless animated WebP.
+void write_animation(const std::filesystem::path& path, std::span<const Image> frames, float seconds);
+
+}  // namespace patina::report

@@ -1,0 +1,1 @@
+#include "patina/views/view_set.h"

@@ -1,0 +1,84 @@
+// The views of an asset: cameras on an orbit, their renders and G-buffers, tiled row by row into a square grid.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "patina/asset/asset.h"
+#include "patina/base/progress.h"
+#include "patina/render/camera.h"
+#include "patina/render/path_tracer.h"
+#include "patina/render/scene.h"
+
+namespace patina::views {
+
+/// Noise-free buffers of the first surface through each pixel centre, [H,W,·] row by row; entries without a hit have primitive < 0.
+struct GBuffer {
+  int width = 0, height = 0;
+  std::vector<int32_t> primitive;      // into Scene::primitives(), -1 where nothing was hit
+  std::vector<int32_t> triangle;
+  std::vector<int32_t> material;       // into Scene::materials(), -1 where nothing was hit
+  std::vector<vec2> uv;                // UV set 0 as the mesh has it
+  std::vector<vec3> p_world;           // metres
+  std::vector<vec3> n_shading_world;   // unit, toward the camera
+  std::vector<vec3> n_geometric_world;
+  std::vector<float> view_cosine;      // cos of the angle between the geometric normal and the direction to the eye
+  std::vector<float> depth;            // metres along the viewing axis, infinity where nothing was hit
+  std::vector<float> coverage;         // share of the pixel that enhanced surface covers, 4 × 4 rays, [0,1]
+};
+
+struct View {
+  render::Camera camera;
+  GBuffer gbuffer;
+  Image radiance;   // [H,W,3] linear HDR, premultiplied by `coverage`
+  Image coverage;   // [H,W,1] of any surface (asset and context)
+};
+
+/// V = grid × grid views of one size.
+struct ViewSet {
+  int grid = 0;               // views a row and a column: 2, 3 or 4
+  float exposure_ev = 0;      // chosen once for all views
+  std::vector<View> views;
+};
+
+struct OrbitOptions {
+  int num_views = 9;                                  // 4, 9 or 16
+  int resolution = 512;                               // pixels a side of one view
+  std::vector<float> elevations{glm::radians(20.0f)}; // radians, used in turn
+  float azimuth_start = 0;                            // radians
+  float fov_y = glm::radians(35.0f);
+  float distance = 0;                                 // metres from the centre; 0: the bounding sphere just fits
+};
+
+/// Cameras at equal steps of azimuth (360°/V) around the bounding sphere [Hadadan2025, Sec. 4].
+std::vector<render::Camera> orbit_cameras(const asset::Bounds& bounds, const OrbitOptions& options);
+
+GBuffer make_gbuffer(const render::Scene& scene, const render::Camera& camera);
+
+struct ViewOptions {
+  render::PathOptions path;
+  std::optional<float> exposure_ev;   // nullopt: chosen so that the object's log-average luminance lands at middle grey
+};
+
+/// Renders every camera and fills G-buffers; cameras.size() must be a square number.
+ViewSet render_views(const render::Scene& scene, std::span<const render::Camera> cameras, const ViewOptions& options,
+                     const Progress& progress);
+
+/// Share of the asset's surface area (enhanced materials) that at least `min_views` views see, by area-weighted samples
+/// on the triangles, tested for visibility by ray casts; `material` < 0 means all materials.
+float seen_share(const render::Scene& scene, std::span<const render::Camera> cameras, int min_views = 1, int material = -1);
+
+/// Input of ControlNet tile: the tone-mapped sRGB view over a neutral backdrop. [H,W,3] sRGB [0,1].
+inline constexpr float kBackdropSrgb = 0.5f;
+Image tile_control(const View& view, float exposure_ev);
+
+/// Input of ControlNet v1.1 normalbae: blue is front, red is left, green is top: RGB = ½ + ½(−n_x, n_y, n_z) in a camera frame
+/// with x right, y up, z toward the camera; black where nothing was hit. [H,W,3] [0,1].
+Image normal_control(const View& view);
+
+/// Tiles grid × grid images of one size row by row, and cuts them apart again.
+Image tile_grid(std::span<const Image> views);
+std::vector<Image> untile_grid(const Image& grid_image, int grid);
+
+}  // namespace patina::views
