@@ -1,4 +1,5 @@
-// Image files through OpenImageIO (PNG, JPEG, HDR, EXR), from disk or memory, with limits against hostile headers.
+// Image files through OpenImageIO (PNG, JPEG, HDR, EXR), from disk or memory, with limits against hostile
+// headers.
 #pragma once
 
 #include <cstdint>
@@ -11,29 +12,29 @@
 
 namespace patina {
 
-/// What a decoder may spend; a header that promises more, or more than its compressed bytes could hold, is refused
-/// before anything is allocated.
+/// What a decoder may spend; a header that promises more, or more than its compressed bytes could hold, is
+/// refused before anything is allocated.
 struct ImageLimits {
   int max_side = 16384;
-  uint64_t max_pixels = uint64_t{1} << 27;
+  uint64_t max_pixels = uint64_t{1} << 26;  // a gibibyte as four float channels
 };
 
-/// Decodes PNG/JPEG bytes. Values as stored, divided by the integer maximum: [0,1], no colour conversion whatever
-/// the file's gamma, chromaticities or ICC profile say (glTF asks for that). 1 to 4 channels as stored; palettes expanded.
-/// Throws Error{kFormat, kLimit} with `name` as context.
+/// Decodes PNG/JPEG bytes. Values as stored, divided by the integer maximum: [0,1], no colour conversion
+/// whatever the file's gamma, chromaticities or ICC profile say (glTF asks for that). 1 to 4 channels as
+/// stored; palettes expanded. Throws Error{kFormat, kLimit} with `name` as context.
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name, const ImageLimits& limits = {});
 
 /// Reads a PNG or JPEG file the same way.
 Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
-/// Reads an HDR (Radiance) or EXR equirectangular map: linear Rec. 709 [H,W,3], non-finite and negative values refused or
-/// clamped with the reason in the error; see the .cpp for which.
+/// Reads an HDR (Radiance) or EXR equirectangular map: linear Rec. 709 [H,W,3]. A single channel is taken
+/// as grey; values that are not finite are refused (the error names the pixel), negative ones become zero.
 Image read_hdr(const std::filesystem::path& path, const ImageLimits& limits = {});
 
 /// Encodes to 8-bit PNG (1 to 4 channels, values clamped to [0,1], rounded to nearest), deterministic bytes.
 std::vector<uint8_t> encode_png(const Image& image);
 
-/// Writes atomically by extension: .png 8 bit as above, .jpg quality 92, .exr 16-bit half or 32-bit float linear.
+/// Writes atomically by extension: .png 8 bit as above, .jpg quality 92, .exr 32-bit float linear (exact).
 void write_image(const std::filesystem::path& path, const Image& image);
 
 }  // namespace patina
