@@ -1,0 +1,63 @@
+// Views tiled row by row into one square image, and cut apart again.
+#include <algorithm>
+#include <string>
+
+#include "patina/base/error.h"
+#include "patina/views/view_set.h"
+
+namespace patina::views {
+
+int grid_of(size_t num_views) {
+  int grid = 0;
+  while (static_cast<size_t>(grid) * static_cast<size_t>(grid) < num_views) ++grid;
+  if (num_views == 0 || static_cast<size_t>(grid) * static_cast<size_t>(grid) != num_views) {
+    throw Error(ErrorCode::kUsage, "view grid",
+                "the number of views must be a square (4, 9 or 16), found " + std::to_string(num_views));
+  }
+  return grid;
+}
+
+Image tile_grid(std::span<const Image> views) {
+  const int grid = grid_of(views.size());
+  const Image& first = views.front();
+  Image out(grid * first.width, grid * first.height, first.channels);
+  for (size_t index = 0; index < views.size(); ++index) {
+    const Image& view = views[index];
+    if (view.width != first.width || view.height != first.height || view.channels != first.channels) {
+      throw Error(ErrorCode::kUsage, "view " + std::to_string(index),
+                  "all views of a grid must have one size: expected " + std::to_string(first.width) + " x " +
+                      std::to_string(first.height) + " x " + std::to_string(first.channels) + ", found " +
+                      std::to_string(view.width) + " x " + std::to_string(view.height) + " x " +
+                      std::to_string(view.channels));
+    }
+    const int x0 = static_cast<int>(index) % grid * view.width;
+    const int y0 = static_cast<int>(index) / grid * view.height;
+    for (int y = 0; y < view.height; ++y)
+      std::copy_n(view.at(0, y), static_cast<size_t>(view.width) * static_cast<size_t>(view.channels),
+                  out.at(x0, y0 + y));
+  }
+  return out;
+}
+
+std::vector<Image> untile_grid(const Image& grid_image, int grid) {
+  if (grid < 1 || grid_image.width % grid != 0 || grid_image.height % grid != 0) {
+    throw Error(ErrorCode::kUsage, "view grid",
+                "an image of " + std::to_string(grid_image.width) + " x " +
+                    std::to_string(grid_image.height) + " pixels cannot be cut into " + std::to_string(grid) +
+                    " x " + std::to_string(grid) + " views");
+  }
+  const int width = grid_image.width / grid, height = grid_image.height / grid;
+  std::vector<Image> views;
+  views.reserve(static_cast<size_t>(grid) * static_cast<size_t>(grid));
+  for (int row = 0; row < grid; ++row) {
+    for (int column = 0; column < grid; ++column) {
+      Image& view = views.emplace_back(width, height, grid_image.channels);
+      for (int y = 0; y < height; ++y)
+        std::copy_n(grid_image.at(column * width, row * height + y),
+                    static_cast<size_t>(width) * static_cast<size_t>(grid_image.channels), view.at(0, y));
+    }
+  }
+  return views;
+}
+
+}  // namespace patina::views

@@ -1,1 +1,0 @@
-#include "patina/views/view_set.h"

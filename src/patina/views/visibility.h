@@ -1,0 +1,42 @@
+// Whether a camera sees a point of the surface, and which surfaces count: the asset's own, from their front.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "patina/render/scene.h"
+
+namespace patina::views {
+
+/// How much nearer to the eye than the point, as a share of its distance, a surface must lie to hide it. It
+/// covers the rounding of single-precision positions (1e-7) and of Embree's hits at grazing angles.
+inline constexpr float kVisibilityTolerance = 1e-4f;
+
+/// Corners of a triangle in world space, and what follows from them.
+struct Triangle {
+  vec3 a, b, c;
+  vec3 cross() const { return glm::cross(b - a, c - a); }  // outward normal times twice the area
+  float area() const { return 0.5f * glm::length(cross()); }
+  vec3 at(const vec2& barycentric) const { return a + barycentric.x * (b - a) + barycentric.y * (c - a); }
+};
+Triangle triangle_of(const render::Scene& scene, uint32_t primitive, uint32_t triangle);
+
+/// A ray's first surface if the asset (not its context) owns it and shows its front; a double-sided material
+/// has two fronts.
+struct FrontHit {
+  render::Hit hit;
+  vec3 p_world;
+  vec3 n_world;  // unit, geometric, toward the eye
+  float cosine;  // between n_world and the direction to the eye, in (0,1]
+};
+std::optional<FrontHit> front_hit(const render::Scene& scene, const render::Ray& ray);
+
+/// Pixel coordinates at which `camera` sees the point p with geometric normal n; nullopt where p lies behind
+/// the eye, outside of the image, on a surface turned away, or behind something.
+std::optional<vec2> seen_at(const render::Scene& scene, const render::Camera& camera, const vec3& p_world,
+                            const vec3& n_world);
+
+/// True if nothing lies between the eye and p; neither facing nor the image's frame is asked for.
+bool unoccluded(const render::Scene& scene, const vec3& eye, const vec3& p_world);
+
+}  // namespace patina::views
