@@ -17,33 +17,39 @@ namespace patina::report {
 /// Images side by side, `columns` a row, on a neutral ground, scaled to `tile_width` pixels. [H,W,3] sRGB.
 Image contact_sheet(std::span<const Image> images, int columns, int tile_width);
 
-/// Share of high-frequency energy kept: energy above `cutoff` cycles/pixel of `image` over that of `reference`, luminance,
-/// weighted by mask [H,W,1]; 1 means as sharp.
+/// Share of high-frequency energy kept: Σ m·(Y − blur(Y))² of `image` over that of `reference`, Y = Rec. 709
+/// luminance of the sRGB values, blur a Gaussian of σ = 1 pixel (half amplitude at 0.19 cycles/pixel)
+/// normalised inside the mask, so that the silhouette counts nothing; 1 means as sharp, more means noise.
+/// mask [H,W,1] in [0,1] or empty; NaN where it weighs nothing.
 float sharpness_kept(const Image& image, const Image& reference, const Image& mask);
 
-/// Peak signal-to-noise ratio in dB over pixels weighted by `mask` ([H,W,1] or empty), peak 1. Infinity when equal.
+/// Peak signal-to-noise ratio in dB over pixels weighted by `mask` ([H,W,1] or empty), peak 1. Infinity when
+/// equal, NaN where the mask weighs nothing.
 float psnr(const Image& a, const Image& b, const Image& mask = {});
 
 struct TexturePair {
-  std::string material, slot;    // "base colour", "normal", "roughness", "metallic"
-  Image before, after;           // as they are shown: sRGB or encoded normal, [0,1]
+  std::string material, slot;  // "base colour", "normal", "roughness", "metallic"
+  Image before, after;         // as they are shown: sRGB or encoded normal, [0,1]
 };
 
 struct ReportData {
-  std::string title;                          // asset file name
+  std::string title;  // asset file name
   std::string prompt, negative_prompt;
-  std::vector<Image> before, edited, after;   // one a view, sRGB
+  std::vector<Image> before, edited, after;  // one a view, sRGB
   std::vector<TexturePair> textures;
   std::vector<float> loss;
   nlohmann::json config, metrics;
   std::vector<std::string> warnings;
-  std::filesystem::path turntable;            // relative to the page; empty: none (embedded as data)
+  std::filesystem::path turntable;  // relative to the page; empty: none (embedded as data)
 };
 
-/// Writes report.html: everything inside it (images as data URIs), readable without network, light and dark, prints well.
+/// Writes report.html: everything inside it (images as data URIs), readable without network, light and dark,
+/// prints well.
 void write_report(const std::filesystem::path& path, const ReportData& data);
 
-/// Renders `frames` views around the asset and writes an animated WebP, before and after side by side.
+/// Carries cameras[0] once around the vertical axis through the asset's middle in `frames` steps, and writes
+/// what it sees as an animated WebP, before and after side by side. Both scenes hold the same geometry;
+/// lights stand still.
 struct TurntableOptions {
   int frames = 24;
   int resolution = 256;
@@ -51,8 +57,9 @@ struct TurntableOptions {
   float exposure_ev = 0;
   float seconds = 4;
 };
-void write_turntable(const std::filesystem::path& path, const render::Scene& before, const render::Scene& after,
-                     std::span<const render::Camera> cameras, const TurntableOptions& options, const Progress& progress);
+void write_turntable(const std::filesystem::path& path, const render::Scene& before,
+                     const render::Scene& after, std::span<const render::Camera> cameras,
+                     const TurntableOptions& options, const Progress& progress);
 
 /// Writes frames ([H,W,3] sRGB, one size) as an endless animated WebP.
 void write_animation(const std::filesystem::path& path, std::span<const Image> frames, float seconds);

@@ -1,0 +1,237 @@
+// Puts the report page together: what was asked, what came out, how good it is, and what it cost.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/base/parallel.h"
+#include "patina/report/html.h"
+#include "patina/report/loss_plot.h"
+#include "patina/report/metrics_table.h"
+#include "patina/report/page_style.h"
+#include "patina/report/report.h"
+#include "patina/report/scale.h"
+#include "patina/report/webp.h"
+
+namespace patina::report {
+namespace {
+
+// Pictures larger than they are ever shown only make the page slow to load: 9 views before, edited and after
+// at 512 pixels and quality 82 take about 1 MB.
+constexpr int kViewSide = 512;
+constexpr int kTextureSide = 512, kTextureSideOfMany = 256;
+constexpr size_t kManyTextures = 24;
+constexpr float kQuality = 82;
+
+// An image as the page shows it. Colours are averaged in linear light; normals and roughness as they are
+// stored.
+std::string embedded(const Image& image, int max_side, bool is_color) {
+  const double scale = std::min(1.0, static_cast<double>(max_side) / std::max(image.width, image.height));
+  const int width = std::max(1, static_cast<int>(std::lround(scale * image.width)));
+  const int height = std::max(1, static_cast<int>(std::lround(scale * image.height)));
+  const Image rgb = as_rgb(image);
+  return data_uri(
+      encode_webp(is_color ? scaled_srgb(rgb, width, height) : scaled(rgb, width, height), kQuality),
+      "image/webp");
+}
+
+std::string head(const ReportData& data) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
+      "'unsafe-inline'; "
+      "script-src 'unsafe-inline'\">\n<title>{} · patina</title>\n<style>{}</style>\n</head>\n",
+      escaped(data.title, 200), kPageStyle);
+}
+
+std::string heading(const ReportData& data) {
+  std::string html =
+      "<header>\n<p class=\"mark\">patina report</p>\n<h1>" + escaped(data.title, 200) + "</h1>\n";
+  if (!data.prompt.empty()) html += "<p class=\"prompt\">" + escaped(data.prompt) + "</p>\n";
+  if (!data.negative_prompt.empty())
+    html += "<p class=\"negative\">without <em>" + escaped(data.negative_prompt) + "</em></p>\n";
+
+  std::vector<std::string> facts;
+  if (!data.before.empty())
+    facts.push_back(fmt::format("<b>{}</b> views of <b>{} × {}</b>", data.before.size(), data.before[0].width,
+                                data.before[0].height));
+  if (!data.textures.empty())
+    facts.push_back(fmt::format("<b>{}</b> {} changed", data.textures.size(),
+                                data.textures.size() == 1 ? "texture" : "textures"));
+  if (!data.loss.empty()) facts.push_back(fmt::format("<b>{}</b> iterations of the fit", data.loss.size()));
+  if (const double seconds = total_seconds(data.metrics); seconds > 0)
+    facts.push_back("<b>" + duration(seconds) + "</b>");
+  if (!facts.empty()) {
+    html += "<ul class=\"facts\">";
+    for (const std::string& fact : facts) html += "<li>" + fact + "</li>";
+    html += "</ul>\n";
+  }
+  return html + "</header>\n";
+}
+
+std::string warnings(const ReportData& data) {
+  if (data.warnings.empty()) return "";
+  std::string html = "<section class=\"warnings\">\n<h2>What you should know</h2>\n<ul>\n";
+  for (const std::string& warning : data.warnings) html += "<li>" + escaped(warning) + "</li>\n";
+  return html + "</ul>\n</section>\n";
+}
+
+std::string turntable(const std::filesystem::path& page, const ReportData& data) {
+  if (data.turntable.empty()) return "";
+  const auto bytes = read_file(page.parent_path() / data.turntable);
+  return fmt::format(
+      "<figure class=\"turntable\">\n<img src=\"{}\" alt=\"The asset turning, before on the left, after on "
+      "the right\">\n"
+      "<figcaption><span>Before</span><span>After</span></figcaption>\n</figure>\n",
+      data_uri(bytes, "image/webp"));
+}
+
+// The views, before, edited and after, beside each other or one kind at a time in the same places: flipping
+// between two pictures shows differences that the eye does not find side by side.
+std::string views(const ReportData& data) {
+  struct Kind {
+    const char* name;
+    const char* label;
+    const std::vector<Image>* images;
+  };
+  std::vector<Kind> kinds;
+  for (const Kind& kind : {Kind{"before", "Before", &data.before}, Kind{"edited", "Edited", &data.edited},
+                           Kind{"after", "After", &data.after}})
+    if (!kind.images->empty()) kinds.push_back(kind);
+  if (kinds.empty()) return "";
+  size_t num_views = 0;
+  for (const Kind& kind : kinds) num_views = std::max(num_views, kind.images->size());
+
+  std::vector<std::string> uris(num_views * kinds.size());
+  parallel_for(0, static_cast<int64_t>(uris.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      const std::vector<Image>& images = *kinds[i % kinds.size()].images;
+      if (i / kinds.size() < images.size()) uris[i] = embedded(images[i / kinds.size()], kViewSide, true);
+    }
+  });
+
+  const int columns = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(num_views))));
+  const bool can_wipe = !data.before.empty() && !data.after.empty();
+  std::string html = fmt::format(
+      "<section class=\"views\" style=\"--columns:{};--kinds:{}\">\n<h2>Views</h2>\n", columns, kinds.size());
+  html +=
+      "<p class=\"lead\">Before: the asset as it came. Edited: what the diffusion model made of those "
+      "renders. "
+      "After: the asset rendered with its new textures.</p>\n";
+  const auto choice = [&](const char* name, bool checked) {
+    html += fmt::format("<input class=\"choice\" type=\"radio\" name=\"compare\" id=\"c-{}\"{}>\n", name,
+                        checked ? " checked" : "");
+  };
+  choice("side", true);
+  for (const Kind& kind : kinds) choice(kind.name, false);
+  if (can_wipe) choice("wipe", false);
+  html += "<div class=\"tabs\"><label for=\"c-side\">Side by side</label>";
+  for (const Kind& kind : kinds) html += fmt::format("<label for=\"c-{}\">{}</label>", kind.name, kind.label);
+  if (can_wipe) html += "<label for=\"c-wipe\">Wipe</label>";
+  html += "</div>\n";
+  if (can_wipe)
+    html +=
+        "<label class=\"cut\">Before <input type=\"range\" min=\"0\" max=\"100\" value=\"50\" "
+        "aria-label=\"Where after begins\"> After</label>\n";
+  html += "<div class=\"heads\"><span></span>";
+  for (const Kind& kind : kinds) html += fmt::format("<span>{}</span>", kind.label);
+  html += "</div>\n<div class=\"sheet\">\n";
+  for (size_t v = 0; v < num_views; ++v) {
+    html += fmt::format("<figure class=\"view\"><figcaption><span>View </span>{}</figcaption>", v + 1);
+    for (size_t k = 0; k < kinds.size(); ++k) {
+      if (v >= kinds[k].images->size()) continue;
+      const Image& image = (*kinds[k].images)[v];
+      html += fmt::format("<img class=\"{}\" width=\"{}\" height=\"{}\" alt=\"View {}, {}\" src=\"{}\">",
+                          kinds[k].name, image.width, image.height, v + 1, kinds[k].name,
+                          uris[v * kinds.size() + k]);
+    }
+    html += "<i class=\"line\"></i></figure>\n";
+  }
+  return html + "</div>\n</section>\n";
+}
+
+std::string textures(const ReportData& data) {
+  if (data.textures.empty()) return "";
+  const int side = data.textures.size() > kManyTextures ? kTextureSideOfMany : kTextureSide;
+  std::vector<std::string> uris(2 * data.textures.size());
+  parallel_for(0, static_cast<int64_t>(uris.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      const TexturePair& pair = data.textures[i / 2];
+      const Image& image = i % 2 ? pair.after : pair.before;
+      if (!image.empty()) uris[i] = embedded(image, side, pair.slot == "base colour");
+    }
+  });
+
+  std::string html =
+      "<section>\n<h2>Textures</h2>\n<p class=\"lead\">Left as it was, right as it is now.</p>\n";
+  const auto size_text = [](const Image& image) {
+    return image.empty() ? std::string("none") : fmt::format("{} × {}", image.width, image.height);
+  };
+  for (size_t i = 0; i < data.textures.size(); ++i) {
+    const TexturePair& pair = data.textures[i];
+    const bool first = i == 0 || data.textures[i - 1].material != pair.material;
+    if (first)
+      html += fmt::format("{}<h3>{}</h3>\n<div class=\"textures\">\n", i ? "</div>\n" : "",
+                          escaped(pair.material, 200));
+    html += "<figure class=\"pair\">";
+    for (const bool after : {false, true}) {
+      const Image& image = after ? pair.after : pair.before;
+      if (image.empty())
+        html += "<span></span>";
+      else
+        html += fmt::format("<img width=\"{}\" height=\"{}\" alt=\"{}, {}\" src=\"{}\">", image.width,
+                            image.height, escaped(pair.slot, 100), after ? "after" : "before",
+                            uris[2 * i + after]);
+    }
+    const std::string before_size = size_text(pair.before), after_size = size_text(pair.after);
+    html +=
+        fmt::format("<figcaption><b>{}</b><span>{}</span></figcaption></figure>\n", escaped(pair.slot, 100),
+                    before_size == after_size ? after_size : before_size + " → " + after_size);
+  }
+  return html + "</div>\n</section>\n";
+}
+
+std::string section(std::string_view title, std::string_view lead, const std::string& content) {
+  if (content.empty()) return "";
+  std::string html = fmt::format("<section>\n<h2>{}</h2>\n", title);
+  if (!lead.empty()) html += fmt::format("<p class=\"lead\">{}</p>\n", lead);
+  return html + "<div class=\"scroll\">" + content + "</div>\n</section>\n";
+}
+
+std::string config(const ReportData& data) {
+  if (data.config.empty()) return "";
+  return "<details>\n<summary>Every value that was used</summary>\n<pre>" +
+         escaped_lines(data.config.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) +
+         "</pre>\n</details>\n";
+}
+
+}  // namespace
+
+void write_report(const std::filesystem::path& path, const ReportData& data) {
+  std::string html = head(data);
+  html += "<body>\n";
+  html += heading(data);
+  html += warnings(data);
+  html += turntable(path, data);
+  html += views(data);
+  html += textures(data);
+  html += section("Quality", "The marks are rules of thumb; your eye on the pictures above comes first.",
+                  metrics_table(data.metrics));
+  html += section("Fit", "How far the renders with the new textures are from the edited views.",
+                  loss_plot(data.loss));
+  html += section("Time and memory", "", stage_table(data.metrics));
+  html += config(data);
+  html += fmt::format(
+      "<footer>Made by patina {}. This page is one file and reads nothing from the network.</footer>\n",
+      PATINA_VERSION);
+  html += fmt::format("<script>{}</script>\n</body>\n</html>\n", kPageScript);
+  write_file(path, html);
+}
+
+}  // namespace patina::report

@@ -1,1 +1,0 @@
-#include "patina/report/report.h"
