@@ -20,14 +20,22 @@ class Environment {
     vec3 radiance;
     float pdf;  // per steradian, > 0
   };
+  /// Texels are chosen in proportion to the light that the bilinear look-up gives over them, directions uniformly over the
+  /// texel's solid angle; so the density is positive wherever the radiance is, and exact at the poles.
   Sample sample(const vec2& u) const;
   float pdf(const vec3& direction) const;
   const Image& map() const { return radiance_; }
+  /// Mean over the sphere of the mean of the three channels, W/m²/sr.
+  float mean_radiance() const { return mean_radiance_; }
 
  private:
   Image radiance_;
-  std::vector<float> marginal_cdf_, conditional_cdf_;
-  double total_ = 0;
+  std::vector<float> marginal_cdf_;      // [H+1] over rows
+  std::vector<float> conditional_cdf_;   // [H, W+1] over the columns of each row
+  std::vector<double> row_cosine_;       // [H+1] cosine of the polar angle at the row boundaries, 1 to -1
+
+  float texel_pdf(int x, int y) const;
+  float mean_radiance_ = 0;
 };
 
 /// The built-in studio: soft key, fill and rim boxes over a grey dome, lit for materials; made by formula, so no file is needed.

@@ -1,6 +1,7 @@
 // What can be rendered: the asset and its context as triangles in Embree, materials, lights, environment.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -25,10 +26,13 @@ struct Hit {
 /// Everything about a hit that shading needs.
 struct SurfacePoint {
   vec3 p_world;
+  float offset = 0;            // metres: how far along n_geometric a new ray must start not to meet this surface again
   vec3 n_geometric;            // unit, on the side the ray came from
-  vec3 n_interpolated;         // unit vertex normal, flipped with n_geometric
-  vec3 tangent, bitangent;     // with n_interpolated the frame in which the normal map is read (right-handed or mirrored)
-  vec3 n_shading;              // normal map applied, kept on wo's side
+  vec3 n_interpolated;         // unit vertex normal, flipped where needed to n_geometric's side
+  vec3 tangent, bitangent;     // with n_interpolated the frame in which the normal map is read (right-handed or mirrored);
+                               // flipped together with it
+  vec3 n_shading;              // normal map applied, kept where wo sees it (visible_shading_normal)
+  bool n_shading_moved = false;  // whether that changed it: then it does not depend on the normal map in the usual way
   bool front_face = true;
   int material = 0;            // into Scene::materials()
   std::vector<vec2>::size_type num_uv_sets = 0;
@@ -38,7 +42,17 @@ struct SurfacePoint {
   vec3 emission{0.0f};         // W/m²/sr
 };
 
-/// Owns the Embree scene; geometry never changes after construction, materials may be replaced.
+/// The ray that leaves a surface toward the unit vector `direction`, above or below.
+Ray spawn_ray(const SurfacePoint& point, const vec3& direction);
+/// The same with t_max just short of `p_target`, itself a point of a surface: for asking whether one sees the other.
+Ray spawn_segment(const SurfacePoint& point, const vec3& p_target);
+
+class Lights;
+
+/// Owns the Embree scene; geometry never changes after construction, materials may be replaced. Refers to `asset` and
+/// `context`, which must live and stay as they are for as long as the scene does. All const members may be called from many
+/// threads. Surfaces are rendered from both sides whatever `double_sided` says: culling back faces, as rasterisers do, would
+/// let light through closed walls. Emission leaves both sides too.
 class Scene {
  public:
   struct Options {
@@ -55,7 +69,8 @@ class Scene {
   Scene& operator=(Scene&&) noexcept;
 
   /// First surface along the ray. Masked texels below their cutoff are passed through; blended ones count as hit with
-  /// probability alpha: `u_alpha` in [0,1) decides (0.5: alpha above one half).
+  /// probability alpha: `u_alpha` in [0,1) decides (0.5: alpha above one half; through several layers, the one at which the
+  /// opacity gathered so far passes one half).
   std::optional<Hit> intersect(const Ray& ray, float u_alpha = 0.5f) const;
   /// True if anything lies between t_min and t_max; alpha as above.
   bool occluded(const Ray& ray, float u_alpha = 0.5f) const;
@@ -69,11 +84,16 @@ class Scene {
   /// Replaces the asset's materials (num_asset_materials entries).
   void set_asset_materials(std::vector<asset::MaterialMaps> maps);
   const Environment& environment() const;
-  std::span<const asset::Light> lights() const;
+  std::span<const asset::Light> lights() const;   // the asset's punctual lights, then the context's
+  /// Samples everything that gives light: environment, emissive triangles, punctual lights.
+  const Lights& light_sampler() const;
+  /// Bounds of all geometry.
+  asset::Bounds bounds() const;
   BsdfModel bsdf_model() const;
 
+  struct State;   // scene_state.h
+
  private:
-  struct State;
   std::unique_ptr<State> state_;
 };
 
