@@ -1,4 +1,5 @@
-// The initial latent noise of all views, integrated from one white-noise field that lives on the surface [Hadadan2025, Sec. 4.2].
+// The initial latent noise of all views, integrated from one white-noise field that lives on the surface
+// [Hadadan2025, Sec. 4.2].
 #pragma once
 
 #include <cstdint>
@@ -13,23 +14,27 @@ namespace patina::correspond {
 enum class NoiseMode {
   kIndependent,  // white noise, no relation between views
   kPaper,        // 4 × 4 point samples of a 1024² field [Hadadan2025]
-  kExact,        // the footprint integrated exactly over the field's texels
+  kExact,        // every point of a field on the surface counted in the pixel where it is seen: white by
+                 // construction
 };
 
-/// Noise of a whole view grid, ready for the sampler. values [4, height, width] f32, zero mean and unit variance.
+/// Noise of a whole view grid, ready for the sampler. values [4, height, width] f32, zero mean and unit
+/// variance. Where a latent pixel shows no enhanced surface, or only in part, independent noise has the
+/// remaining share of the variance.
 struct NoiseField {
-  int width = 0, height = 0;   // latent pixels of the whole grid
+  int width = 0, height = 0;  // latent pixels of the whole grid
   std::vector<float> values;
 };
 
 struct NoiseOptions {
   NoiseMode mode = NoiseMode::kExact;
-  int field_size = 1024;       // M: texels a side of the field, a unit of UV
+  int field_size =
+      1024;  // M: texels a side of the field, a unit of UV; kPaper only, kExact fits its field to the views
   uint64_t seed = 0;
 };
 
-/// cameras: grid × grid views; latent_scale: image pixels a latent pixel (8 for Stable Diffusion). Each view's
-/// width and height must be divisible by it.
+/// cameras: grid × grid views; latent_scale: image pixels a latent pixel (8 for Stable Diffusion). Each
+/// view's width and height must be divisible by it.
 NoiseField make_noise(const render::Scene& scene, std::span<const render::Camera> cameras, int latent_scale,
                       const NoiseOptions& options, const Progress& progress = {});
 

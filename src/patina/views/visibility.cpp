@@ -44,6 +44,16 @@ bool unoccluded(const render::Scene& scene, const vec3& eye, const vec3& p_world
   return !scene.occluded(ray);
 }
 
+bool opaque_at(const render::Scene& scene, const vec3& eye, const vec3& p_world) {
+  const vec3 to_point = p_world - eye;
+  const float distance = glm::length(to_point);
+  if (!(distance > 0.0f)) return false;
+  render::Ray ray{eye, to_point / distance};
+  ray.t_min = distance * (1.0f - kVisibilityTolerance);
+  ray.t_max = distance * (1.0f + kVisibilityTolerance);
+  return scene.occluded(ray);
+}
+
 std::optional<vec2> seen_at(const render::Scene& scene, const render::Camera& camera, const vec3& p_world,
                             const vec3& n_world) {
   const vec3 eye = camera.position();
@@ -96,12 +106,16 @@ float seen_share(const render::Scene& scene, std::span<const render::Camera> cam
       const vec3 p_world = triangle.at(barycentric);
       vec3 n_world = triangle.cross();
       const int owner = scene.primitives()[place.primitive]->material;
-      const bool double_sided = scene.materials()[static_cast<size_t>(owner)].double_sided;
+      const asset::MaterialMaps& maps = scene.materials()[static_cast<size_t>(owner)];
+      const bool double_sided = maps.double_sided;
+      const bool see_through = maps.alpha_mode != asset::AlphaMode::kOpaque;
       int views = 0;
       for (const render::Camera& camera : cameras) {
         const vec3 n_seen =
             double_sided && glm::dot(n_world, camera.position() - p_world) < 0.0f ? -n_world : n_world;
-        if (seen_at(scene, camera, p_world, n_seen)) ++views;
+        if (seen_at(scene, camera, p_world, n_seen) &&
+            (!see_through || opaque_at(scene, camera.position(), p_world)))
+          ++views;
         if (views >= min_views) break;
       }
       if (views >= min_views) ++seen;

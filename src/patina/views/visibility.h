@@ -39,4 +39,7 @@ std::optional<vec2> seen_at(const render::Scene& scene, const render::Camera& ca
 /// True if nothing lies between the eye and p; neither facing nor the image's frame is asked for.
 bool unoccluded(const render::Scene& scene, const vec3& eye, const vec3& p_world);
 
+/// True if the surface at p, seen from the eye, is there: false where a mask or a blend makes it transparent.
+bool opaque_at(const render::Scene& scene, const vec3& eye, const vec3& p_world);
+
 }  // namespace patina::views

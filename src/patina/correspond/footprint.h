@@ -1,0 +1,24 @@
+// What a latent pixel covers: how much of it shows enhanced surface, and how much surface that is.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "patina/render/scene.h"
+#include "patina/views/visibility.h"
+
+namespace patina::correspond {
+
+/// Surface area in m² that one square pixel sees through `ray` at `front`: t² dω / cos θ, with the solid
+/// angle of an off-axis pixel. Grazing hits count at most twenty times their projected area.
+float area_per_pixel(const render::Camera& camera, const render::Ray& ray, const views::FrontHit& front);
+
+/// Latent pixels of one view, [height, width] row by row, by 4 × 4 rays each.
+struct Footprints {
+  int width = 0, height = 0;
+  std::vector<float> coverage;  // share of the latent pixel that shows the front of enhanced surface, [0,1]
+  std::vector<float> area;      // m² of surface in it
+};
+Footprints trace_footprints(const render::Scene& scene, const render::Camera& camera, int latent_scale);
+
+}  // namespace patina::correspond

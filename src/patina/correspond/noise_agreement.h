@@ -1,0 +1,26 @@
+// How much of the possible correlation between two views' noise is there.
+#pragma once
+
+#include <span>
+
+#include "patina/correspond/noise.h"
+
+namespace patina::correspond {
+
+/// Means over pairs of latent pixels of two views that see the same patch.
+struct NoiseAgreement {
+  double correlation = 0;  // E[n₁ n₂], over channels too
+  double bound = 0;  // √(c₁ c₂) · overlap / √(A₁ A₂): what two windows onto one white field can have at most
+  int64_t num_pairs = 0;
+  double of_bound() const { return bound > 0 ? correlation / bound : 0; }
+};
+
+/// Compares view `from` with view `to`: each latent pixel of `from` with the one of `to` that shares most of
+/// its surface. Areas are measured by samples_per_side² rays a latent pixel, independent of how the noise was
+/// made. Several `noises` of one kind and different seeds make the estimate sharper: its deviation is about
+/// 1/√(4 · pairs · noises).
+NoiseAgreement noise_agreement(const render::Scene& scene, std::span<const render::Camera> cameras,
+                               int latent_scale, std::span<const NoiseField> noises, int from, int to,
+                               int samples_per_side = 8);
+
+}  // namespace patina::correspond
