@@ -317,7 +317,8 @@ SafeTensors::SafeTensors(const std::filesystem::path& path) {
     return std::pair(a.bytes.data(), a.bytes.size()) < std::pair(b.bytes.data(), b.bytes.size());
   });
   for (size_t i = 0; i < tensors_.size(); ++i) {
-    if (!index_.emplace(tensors_[i].name, i).second) fail(path, tensor_label(tensors_[i].name) + " is given twice");
+    if (!index_.emplace(tensors_[i].name, i).second)
+      fail(path, tensor_label(tensors_[i].name) + " is given twice");
   }
   uint64_t position = 0;
   for (size_t i = 0; i < tensors_.size(); ++i) {

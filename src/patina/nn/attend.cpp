@@ -1,0 +1,55 @@
+#include "patina/nn/attend.h"
+
+#include <cmath>
+
+#include <ATen/ATen.h>
+
+#include "patina/base/check.h"
+
+namespace patina::nn {
+namespace {
+
+attention::Strides strides_of(const at::Tensor& x, int64_t head_dim) {
+  return {x.stride(0), x.stride(1), head_dim};
+}
+
+}  // namespace
+
+const attention::KeyBuckets* SelfAttentionBias::level(int64_t height, int64_t width) const {
+  if (weight == 0) return nullptr;
+  for (const attention::KeyBuckets& buckets : levels) {
+    if (buckets.height() == height && buckets.width() == width) return &buckets;
+  }
+  return nullptr;
+}
+
+float SelfAttentionBias::beta(int64_t head_dim) const {
+  return scaled_with_scores ? weight / std::sqrt(static_cast<float>(head_dim)) : weight;
+}
+
+at::Tensor attend(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
+                  const attention::KeyBuckets* buckets, float beta) {
+  PATINA_CHECK_EQ(q.dim(), 3);
+  PATINA_CHECK_EQ(q.size(2) % num_heads, 0);
+  PATINA_CHECK(k.size(2) == q.size(2) && v.sizes() == k.sizes() && q.size(0) == k.size(0));
+  PATINA_CHECK(q.scalar_type() == k.scalar_type() && q.scalar_type() == v.scalar_type());
+  PATINA_CHECK(q.scalar_type() == at::kFloat || q.scalar_type() == at::kBFloat16);
+  PATINA_CHECK(q.stride(2) == 1 && k.stride(2) == 1 && v.stride(2) == 1);
+
+  const int64_t head_dim = q.size(2) / num_heads;
+  at::Tensor out = at::empty(q.sizes(), q.options());
+  attention::Arguments arguments;
+  arguments.shape = {q.size(0), q.size(1), k.size(1), num_heads, head_dim};
+  arguments.element = q.scalar_type() == at::kFloat ? attention::Element::kF32 : attention::Element::kBf16;
+  arguments.q = q.data_ptr(), arguments.k = k.data_ptr(), arguments.v = v.data_ptr(),
+  arguments.out = out.data_ptr();
+  arguments.q_strides = strides_of(q, head_dim), arguments.k_strides = strides_of(k, head_dim);
+  arguments.v_strides = strides_of(v, head_dim), arguments.out_strides = strides_of(out, head_dim);
+  arguments.scale = 1.0f / std::sqrt(static_cast<float>(head_dim));
+  arguments.buckets = buckets;
+  arguments.beta = beta;
+  attention::attention_cpu(arguments);
+  return out;
+}
+
+}  // namespace patina::nn

@@ -1,0 +1,50 @@
+// From weight files to tensors: each tensor is asked for by name and expected shape, and every mismatch of a
+// whole network is reported at once.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <ATen/core/Tensor.h>
+
+#include "patina/nn/safetensors.h"
+
+namespace patina::nn {
+
+/// The tensor as the file holds it. Where dtype and alignment allow it lies in the map, without a copy, and
+/// keeps the map alive; else it is one conversion. Throws Error{kUnsupported} for elements that are no F32,
+/// F16, BF16 or F64 if `type` is a floating type; otherwise integers become `type` too.
+at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::ScalarType type);
+
+/// Hands out the tensors of one network and keeps account of what does not fit.
+///
+/// take() never fails at once: what is missing or wrongly shaped is noted and zeros are returned, so that
+/// finish() can name all of it in one message.
+class WeightReader {
+ public:
+  /// Tensors become `type`. `file` must outlive the reader, not the tensors.
+  WeightReader(const SafeTensors& file, at::ScalarType type) : file_(file), type_(type) {}
+
+  at::Tensor take(const std::string& name, std::vector<int64_t> shape) {
+    return take(name, std::move(shape), type_);
+  }
+  at::Tensor take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type);
+  bool has(const std::string& name) const { return file_.find(name) != nullptr; }
+  at::ScalarType type() const { return type_; }
+  int64_t num_parameters() const { return num_parameters_; }
+
+  /// Names that begin so may be in the file unused (position ids, training leftovers).
+  void ignore(std::string prefix) { ignored_.push_back(std::move(prefix)); }
+  /// Throws Error{kFormat} that names missing tensors (with the expected shape), wrong shapes (expected and
+  /// found) and, where nothing else is wrong, tensors that the configuration does not call for.
+  void finish() const;
+
+ private:
+  const SafeTensors& file_;
+  at::ScalarType type_;
+  int64_t num_parameters_ = 0;
+  std::vector<std::string> taken_, ignored_, missing_, misshapen_;
+};
+
+}  // namespace patina::nn
