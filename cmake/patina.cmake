@@ -35,6 +35,8 @@ endif()
 add_library(patina_options INTERFACE)
 target_include_directories(patina_options INTERFACE "${CMAKE_SOURCE_DIR}/src")
 target_compile_options(patina_options INTERFACE
+  # GCC 12 sees overflows and overlaps in std::vector and std::string that are not there (its bugs 105329, 105651).
+  -Wno-stringop-overflow -Wno-restrict
   -march=${PATINA_ARCH} -Wall -Wextra -Wpedantic -Wshadow $<$<BOOL:${PATINA_WERROR}>:-Werror>)
 target_compile_definitions(patina_options INTERFACE GLM_FORCE_SILENT_WARNINGS GLM_ENABLE_EXPERIMENTAL
   PATINA_VERSION="${PROJECT_VERSION}")
@@ -48,6 +50,12 @@ target_include_directories(patina_torch SYSTEM INTERFACE ${TORCH_INCLUDE_DIRS})
 # One static library a folder of src/patina; DEPS repeats the layering rule of docs/architecture.md.
 function(patina_library folder)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PACKAGES" ${ARGN})
+  foreach(source ${ARG_SOURCES})
+    if(NOT EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/${source}")
+      message(WARNING "${folder}: ${source} does not exist yet")
+      list(REMOVE_ITEM ARG_SOURCES ${source})
+    endif()
+  endforeach()
   add_library(patina_${folder} STATIC ${ARG_SOURCES})
   list(TRANSFORM ARG_DEPS PREPEND patina_)
   target_link_libraries(patina_${folder} PUBLIC patina_options ${ARG_DEPS} ${ARG_PACKAGES} Threads::Threads)

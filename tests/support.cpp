@@ -10,11 +10,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path source_root() { return fs::path(__FILE__).parent_path().parent_path(); }
+fs::path source_root() {
+  return fs::path(__FILE__).parent_path().parent_path();
+}
 
 }  // namespace
 
-fs::path data_dir() { return source_root() / "tests" / "data"; }
+fs::path data_dir() {
+  return source_root() / "tests" / "data";
+}
 
 fs::path shared_dir() {
   if (const char* given = std::getenv("PATINA_SHARED"); given && *given) return given;

@@ -29,7 +29,7 @@ class TemporaryFolder {
 }  // namespace patina::test
 
 /// Skips the running test, saying why, where `relative` is missing from the shared folder.
-#define PATINA_REQUIRE_SHARED(relative)                                                        \
-  if (!std::filesystem::exists(::patina::test::shared_dir() / (relative)))                     \
-  GTEST_SKIP() << "needs " << (::patina::test::shared_dir() / (relative)).string()             \
+#define PATINA_REQUIRE_SHARED(relative)                                            \
+  if (!std::filesystem::exists(::patina::test::shared_dir() / (relative)))         \
+  GTEST_SKIP() << "needs " << (::patina::test::shared_dir() / (relative)).string() \
                << "; set PATINA_SHARED to the folder that holds it"

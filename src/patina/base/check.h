@@ -7,9 +7,11 @@
 
 namespace patina::detail {
 
-[[noreturn]] inline void check_failed(const char* expression, const char* file, int line, const std::string& operands) {
+[[noreturn]] inline void check_failed(const char* expression, const char* file, int line,
+                                      const std::string& operands) {
   std::ostringstream text;
-  text << "internal error: " << expression << " does not hold" << operands << " (" << file << ':' << line << ')';
+  text << "internal error: " << expression << " does not hold" << operands << " (" << file << ':' << line
+       << ')';
   throw std::logic_error(text.str());
 }
 
@@ -25,13 +27,13 @@ std::string operands_text(const A& a, const B& b) {
 #define PATINA_CHECK(condition) \
   ((condition) ? void() : ::patina::detail::check_failed(#condition, __FILE__, __LINE__, ""))
 
-#define PATINA_CHECK_OP_(a, op, b)                                                                \
-  do {                                                                                            \
-    const auto& patina_a_ = (a);                                                                  \
-    const auto& patina_b_ = (b);                                                                  \
-    if (!(patina_a_ op patina_b_))                                                                \
-      ::patina::detail::check_failed(#a " " #op " " #b, __FILE__, __LINE__,                       \
-                                     ::patina::detail::operands_text(patina_a_, patina_b_));      \
+#define PATINA_CHECK_OP_(a, op, b)                                                           \
+  do {                                                                                       \
+    const auto& patina_a_ = (a);                                                             \
+    const auto& patina_b_ = (b);                                                             \
+    if (!(patina_a_ op patina_b_))                                                           \
+      ::patina::detail::check_failed(#a " " #op " " #b, __FILE__, __LINE__,                  \
+                                     ::patina::detail::operands_text(patina_a_, patina_b_)); \
   } while (false)
 
 #define PATINA_CHECK_EQ(a, b) PATINA_CHECK_OP_(a, ==, b)

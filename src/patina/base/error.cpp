@@ -5,7 +5,8 @@
 namespace patina {
 namespace {
 
-// Length of the valid UTF-8 sequence at `text[i]`, or 0: overlong forms, surrogates and C1 controls are refused too.
+// Length of the valid UTF-8 sequence at `text[i]`, or 0: overlong forms, surrogates and C1 controls are
+// refused too.
 size_t utf8_length(std::string_view text, size_t i) {
   const auto byte = [&](size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
   const auto follows = [&](size_t k) { return (byte(k) & 0xC0u) == 0x80u; };

@@ -9,18 +9,19 @@
 namespace patina {
 
 enum class ErrorCode {
-  kUsage,         // the user asked for something that cannot be: exit code 2
-  kNotFound,      // a file or folder does not exist
-  kFormat,        // a file is not what its format demands
-  kUnsupported,   // valid, but patina does not read it
-  kLimit,         // valid, but larger than patina accepts
-  kIo,            // reading or writing failed
-  kDevice,        // out of memory, missing instruction set, CUDA failure
-  kInterrupted,   // the user asked to stop
+  kUsage,        // the user asked for something that cannot be: exit code 2
+  kNotFound,     // a file or folder does not exist
+  kFormat,       // a file is not what its format demands
+  kUnsupported,  // valid, but patina does not read it
+  kLimit,        // valid, but larger than patina accepts
+  kIo,           // reading or writing failed
+  kDevice,       // out of memory, missing instruction set, CUDA failure
+  kInterrupted,  // the user asked to stop
 };
 
-/// `message` is one sentence for a person; `context` is where it happened (a file, a JSON path, a tensor name)
-/// and is printed before it. Control characters in either are escaped, so a hostile file cannot write to the terminal.
+/// `message` is one sentence for a person; `context` is where it happened (a file, a JSON path, a tensor
+/// name) and is printed before it. Control characters in either are escaped, so a hostile file cannot write
+/// to the terminal.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, std::string_view context, std::string_view message);
@@ -35,7 +36,8 @@ class Error : public std::runtime_error {
   std::string message_;
 };
 
-/// `text` with control characters and invalid UTF-8 escaped as \xNN and cut to `max_length` bytes; for names that come from files.
+/// `text` with control characters and invalid UTF-8 escaped as \xNN and cut to `max_length` bytes; for names
+/// that come from files.
 std::string printable(std::string_view text, size_t max_length = 200);
 
 }  // namespace patina

@@ -21,8 +21,9 @@ namespace fs = std::filesystem;
 [[noreturn]] void throw_errno(const fs::path& path, std::string_view doing) {
   const int code = errno;
   const bool missing = code == ENOENT || code == ENOTDIR;
-  throw Error(missing ? ErrorCode::kNotFound : ErrorCode::kIo, path.string(),
-              missing ? std::string("no such file or folder") : fmt::format("{}: {}", doing, std::strerror(code)));
+  throw Error(
+      missing ? ErrorCode::kNotFound : ErrorCode::kIo, path.string(),
+      missing ? std::string("no such file or folder") : fmt::format("{}: {}", doing, std::strerror(code)));
 }
 
 // An open file descriptor that closes itself.
@@ -38,7 +39,8 @@ Descriptor open_regular(const fs::path& path, uint64_t& size_bytes) {
   struct stat info;
   if (::stat(path.c_str(), &info) != 0) throw_errno(path, "cannot be opened");
   if (!S_ISREG(info.st_mode))
-    throw Error(ErrorCode::kFormat, path.string(), S_ISDIR(info.st_mode) ? "is a folder, expected a file" : "is not a regular file");
+    throw Error(ErrorCode::kFormat, path.string(),
+                S_ISDIR(info.st_mode) ? "is a folder, expected a file" : "is not a regular file");
   Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
   if (file.fd < 0) throw_errno(path, "cannot be opened");
   size_bytes = static_cast<uint64_t>(info.st_size);
@@ -50,7 +52,8 @@ Buffer read_whole(const fs::path& path, uint64_t max_bytes) {
   uint64_t size = 0;
   const Descriptor file = open_regular(path, size);
   if (size > max_bytes)
-    throw Error(ErrorCode::kLimit, path.string(), fmt::format("has {} bytes, more than the {} that are accepted", size, max_bytes));
+    throw Error(ErrorCode::kLimit, path.string(),
+                fmt::format("has {} bytes, more than the {} that are accepted", size, max_bytes));
   Buffer buffer(size, {});
   size_t done = 0;
   while (done < buffer.size()) {
@@ -63,12 +66,18 @@ Buffer read_whole(const fs::path& path, uint64_t max_bytes) {
   return buffer;
 }
 
-std::string hex(XXH128_hash_t hash) { return fmt::format("{:016x}{:016x}", hash.high64, hash.low64); }
+std::string hex(XXH128_hash_t hash) {
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
 
 }  // namespace
 
-std::vector<uint8_t> read_file(const fs::path& path, uint64_t max_bytes) { return read_whole<std::vector<uint8_t>>(path, max_bytes); }
-std::string read_text_file(const fs::path& path, uint64_t max_bytes) { return read_whole<std::string>(path, max_bytes); }
+std::vector<uint8_t> read_file(const fs::path& path, uint64_t max_bytes) {
+  return read_whole<std::vector<uint8_t>>(path, max_bytes);
+}
+std::string read_text_file(const fs::path& path, uint64_t max_bytes) {
+  return read_whole<std::string>(path, max_bytes);
+}
 
 MappedFile::MappedFile(const fs::path& path) : path_(path) {
   uint64_t size = 0;
@@ -87,9 +96,11 @@ void write_file_with(const fs::path& path, const std::function<void(const fs::pa
   std::error_code failure;
   if (path.has_parent_path()) {
     fs::create_directories(path.parent_path(), failure);
-    if (failure) throw Error(ErrorCode::kIo, path.parent_path().string(), "cannot be made: " + failure.message());
+    if (failure)
+      throw Error(ErrorCode::kIo, path.parent_path().string(), "cannot be made: " + failure.message());
   }
-  fs::path temporary = path.parent_path() / fmt::format(".{}.{}{}", path.stem().string(), ::getpid(), path.extension().string());
+  fs::path temporary = path.parent_path() /
+                       fmt::format(".{}.{}{}", path.stem().string(), ::getpid(), path.extension().string());
   try {
     write(temporary);
     fs::rename(temporary, path);
@@ -105,12 +116,15 @@ void write_file_with(const fs::path& path, const std::function<void(const fs::pa
 void write_file(const fs::path& path, std::span<const uint8_t> bytes) {
   write_file_with(path, [&](const fs::path& temporary) {
     const Descriptor file{::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)};
-    if (file.fd < 0) throw Error(ErrorCode::kIo, path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+    if (file.fd < 0)
+      throw Error(ErrorCode::kIo, path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
     size_t done = 0;
     while (done < bytes.size()) {
       const ssize_t n = ::write(file.fd, bytes.data() + done, bytes.size() - done);
       if (n < 0 && errno == EINTR) continue;
-      if (n < 0) throw Error(ErrorCode::kIo, path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+      if (n < 0)
+        throw Error(ErrorCode::kIo, path.string(),
+                    fmt::format("cannot be written: {}", std::strerror(errno)));
       done += static_cast<size_t>(n);
     }
     if (::fsync(file.fd) != 0 && errno != EINVAL && errno != EROFS)
@@ -122,8 +136,14 @@ void write_file(const fs::path& path, std::string_view text) {
   write_file(path, std::span(reinterpret_cast<const uint8_t*>(text.data()), text.size()));
 }
 
-std::string hash_bytes(std::span<const uint8_t> bytes) { return hex(XXH3_128bits(bytes.data(), bytes.size())); }
-std::string hash_text(std::string_view text) { return hex(XXH3_128bits(text.data(), text.size())); }
-std::string hash_file(const fs::path& path) { return hash_bytes(MappedFile(path).bytes()); }
+std::string hash_bytes(std::span<const uint8_t> bytes) {
+  return hex(XXH3_128bits(bytes.data(), bytes.size()));
+}
+std::string hash_text(std::string_view text) {
+  return hex(XXH3_128bits(text.data(), text.size()));
+}
+std::string hash_file(const fs::path& path) {
+  return hash_bytes(MappedFile(path).bytes());
+}
 
 }  // namespace patina

@@ -32,12 +32,13 @@ class MappedFile {
   std::span<const uint8_t> bytes_;
 };
 
-/// Writes beside `path` and renames: a reader, or a run that was killed, sees the old file or the whole new one.
-/// Missing parent folders are made. Throws Error{kIo} naming the file and the reason.
+/// Writes beside `path` and renames: a reader, or a run that was killed, sees the old file or the whole new
+/// one. Missing parent folders are made. Throws Error{kIo} naming the file and the reason.
 void write_file(const std::filesystem::path& path, std::span<const uint8_t> bytes);
 void write_file(const std::filesystem::path& path, std::string_view text);
 
-/// The same for writers that want a path: `write` gets a temporary path beside `path` with the same extension.
+/// The same for writers that want a path: `write` gets a temporary path beside `path` with the same
+/// extension.
 void write_file_with(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write);
 

@@ -22,15 +22,23 @@ using glm::vec4;
 inline constexpr float kPi = std::numbers::pi_v<float>;
 inline constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 
-inline float square(float x) { return x * x; }
-inline float max_component(const vec3& v) { return std::max(v.x, std::max(v.y, v.z)); }
-inline bool is_finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+inline float square(float x) {
+  return x * x;
+}
+inline float max_component(const vec3& v) {
+  return std::max(v.x, std::max(v.y, v.z));
+}
+inline bool is_finite(const vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 /// Rec. 709 luminance of linear RGB [Y of CIE XYZ].
-inline float luminance(const vec3& rgb) { return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z; }
+inline float luminance(const vec3& rgb) {
+  return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
+}
 
-/// Two unit vectors that form a right-handed orthonormal basis (tangent, bitangent, n) with the unit vector n.
-/// Source: [Duff2017], without a branch and exact at n.z = -1.
+/// Two unit vectors that form a right-handed orthonormal basis (tangent, bitangent, n) with the unit vector
+/// n. Source: [Duff2017], without a branch and exact at n.z = -1.
 struct Basis {
   vec3 tangent, bitangent;
 };

@@ -24,7 +24,8 @@ ThreadLimit& thread_limit() {
 
 }  // namespace
 
-void parallel_for(int64_t begin, int64_t end, int64_t grain, const std::function<void(int64_t, int64_t)>& body) {
+void parallel_for(int64_t begin, int64_t end, int64_t grain,
+                  const std::function<void(int64_t, int64_t)>& body) {
   if (begin >= end) return;
   tbb::parallel_for(tbb::blocked_range<int64_t>(begin, end, static_cast<size_t>(grain > 0 ? grain : 1)),
                     [&](const tbb::blocked_range<int64_t>& range) { body(range.begin(), range.end()); });
@@ -40,9 +41,9 @@ void set_num_threads(int num_threads) {
 }
 
 int num_threads() {
-  return static_cast<int>(std::min<size_t>(
-      static_cast<size_t>(tbb::info::default_concurrency()),
-      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+  return static_cast<int>(
+      std::min<size_t>(static_cast<size_t>(tbb::info::default_concurrency()),
+                       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
 }
 
 }  // namespace patina

@@ -5,7 +5,8 @@
 namespace patina {
 
 void Progress::throw_if_stopped() const {
-  if (stop_requested && stop_requested()) throw Error(ErrorCode::kInterrupted, "", "stopped at the user's request");
+  if (stop_requested && stop_requested())
+    throw Error(ErrorCode::kInterrupted, "", "stopped at the user's request");
 }
 
 }  // namespace patina

@@ -38,7 +38,8 @@ std::array<float, 4> gaussian_from_bits(const std::array<uint32_t, 4>& bits) {
 
 std::array<float, 4> gaussian4(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sub_index) {
   return gaussian_from_bits(
-      philox({static_cast<uint32_t>(index), static_cast<uint32_t>(index >> 32), sub_index, 0}, make_key(seed, purpose)));
+      philox({static_cast<uint32_t>(index), static_cast<uint32_t>(index >> 32), sub_index, 0},
+             make_key(seed, purpose)));
 }
 
 RandomStream::RandomStream(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sub_index)
@@ -59,6 +60,8 @@ float RandomStream::uniform() {
   return uniform_from_bits(block_[static_cast<size_t>(used_++)]);
 }
 
-float RandomStream::gaussian() { return gaussian_from_bits(next_block())[0]; }
+float RandomStream::gaussian() {
+  return gaussian_from_bits(next_block())[0];
+}
 
 }  // namespace patina

@@ -25,7 +25,9 @@ enum class RandomPurpose : uint32_t {
 std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key);
 
 /// A number in [0,1), from the upper 24 bits.
-inline float uniform_from_bits(uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
+inline float uniform_from_bits(uint32_t bits) {
+  return static_cast<float>(bits >> 8) * 0x1p-24f;
+}
 
 /// Four independent standard normal numbers from 128 random bits (Box-Muller; |value| <= 5.8).
 std::array<float, 4> gaussian_from_bits(const std::array<uint32_t, 4>& bits);
@@ -38,12 +40,12 @@ class RandomStream {
  public:
   RandomStream(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sub_index = 0);
 
-  float uniform();     ///< in [0,1)
+  float uniform();  ///< in [0,1)
   vec2 uniform2() {
     const float x = uniform();
     return {x, uniform()};
   }
-  float gaussian();    ///< standard normal
+  float gaussian();  ///< standard normal
 
  private:
   std::array<uint32_t, 4> next_block();

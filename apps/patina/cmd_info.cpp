@@ -1,0 +1,19 @@
+// patina info FILE: what a file holds, and whether patina can use it.
+#include <fmt/format.h>
+
+#include "commands.h"
+#include "patina/pipeline/info.h"
+
+namespace patina::app {
+
+void add_info(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "info", "Tell what an asset, image, environment or weight file holds and whether patina can use it.");
+  auto path = std::make_shared<std::string>();
+  command->add_option("FILE", *path, ".glb .gltf .obj .png .jpg .hdr .exr .safetensors")
+      ->required()
+      ->type_name("");
+  command->callback([=] { fmt::print("{}", pipeline::describe_file(*path)); });
+}
+
+}  // namespace patina::app

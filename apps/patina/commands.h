@@ -1,0 +1,16 @@
+// The subcommands of patina. Each adds itself to the program; what it does when chosen is one call into the
+// pipeline.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace patina::app {
+
+void add_enhance(CLI::App& program);
+void add_render(CLI::App& program);
+void add_detail(CLI::App& program);
+void add_fit(CLI::App& program);
+void add_report(CLI::App& program);
+void add_info(CLI::App& program);
+
+}  // namespace patina::app

@@ -1,0 +1,597 @@
+#include "patina/pipeline/options.h"
+
+#include <charconv>
+#include <limits>
+#include <type_traits>
+
+#include <fmt/format.h>
+
+#include "patina/base/error.h"
+
+namespace patina::pipeline {
+namespace {
+
+using correspond::NoiseMode;
+using diffusion::BiasScaling;
+using diffusion::Dtype;
+using diffusion::Scheduler;
+using render::BsdfModel;
+using Values = std::span<const std::string>;
+using nlohmann::json;
+
+[[noreturn]] void refuse(const Option& option, std::string_view expected, std::string_view found) {
+  throw Error(ErrorCode::kUsage, "--" + option.name,
+              fmt::format("expected {}, found '{}'", expected, printable(found)));
+}
+
+template <class Number>
+Number parse_number(const Option& option, const std::string& text, Number low, Number high) {
+  Number value{};
+  const char* const end = text.data() + text.size();
+  const auto [rest, failure] = std::from_chars(text.data(), end, value);
+  const bool in_range = failure == std::errc() && rest == end && value >= low && value <= high;
+  if (!in_range)
+    refuse(
+        option,
+        fmt::format("a {} from {} to {}", std::is_integral_v<Number> ? "whole number" : "number", low, high),
+        text);
+  return value;
+}
+
+// JSON shows 0.35 rather than the float's nearest double 0.3499999940395355.
+json shortest(float value) {
+  return json::parse(fmt::format("{}", value));
+}
+
+// Builders: each fills set, get and default_text of one kind of option; `member` gives the field of a Config.
+template <class Member>
+Option text_option(Option option, Member member) {
+  option.set = [member](Config& c, Values v) { member(c) = v.front(); };
+  option.get = [member](const Config& c) { return json(std::string(member(const_cast<Config&>(c)))); };
+  return option;
+}
+
+template <class Number, class Member>
+Option number_option(Option option, Number low, Number high, Member member) {
+  const Option named = option;
+  option.set = [=](Config& c, Values v) { member(c) = parse_number<Number>(named, v.front(), low, high); };
+  option.get = [=](const Config& c) -> json {
+    if constexpr (std::is_floating_point_v<Number>)
+      return shortest(member(const_cast<Config&>(c)));
+    else
+      return member(const_cast<Config&>(c));
+  };
+  if (option.default_text.empty()) option.default_text = option.get(Config{}).dump();
+  return option;
+}
+
+template <class Enum>
+using Names = std::vector<std::pair<std::string, Enum>>;
+
+template <class Enum, class Member>
+Option choice_option(Option option, Names<Enum> names, Member member) {
+  for (const auto& [name, value] : names)
+    option.placeholder += (option.placeholder.empty() ? "" : "|") + name;
+  const Option named = option;
+  option.set = [=](Config& c, Values v) {
+    for (const auto& [name, value] : names)
+      if (name == v.front()) {
+        member(c) = value;
+        return;
+      }
+    refuse(named, "one of " + named.placeholder, v.front());
+  };
+  option.get = [=](const Config& c) {
+    for (const auto& [name, value] : names)
+      if (value == member(const_cast<Config&>(c))) return json(name);
+    return json();
+  };
+  option.default_text = option.get(Config{}).template get<std::string>();
+  return option;
+}
+
+Option elevations_option() {
+  Option option{
+      .name = "elevation",
+      .aliases = {},
+      .group = "Views",
+      .placeholder = "DEGREES...",
+      .help = "Height of the cameras over the horizon, degrees; several are used in turn around the orbit.",
+      .default_text = "20",
+      .stages = kRenderStage,
+      .is_list = true};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    c.orbit.elevations.clear();
+    for (const std::string& text : v)
+      c.orbit.elevations.push_back(glm::radians(parse_number(named, text, -89.0f, 89.0f)));
+  };
+  option.get = [](const Config& c) {
+    json list = json::array();
+    for (const float e : c.orbit.elevations)
+      list.push_back(shortest(std::round(glm::degrees(e) * 1e4f) / 1e4f));
+    return list;
+  };
+  return option;
+}
+
+Option degrees_option(Option option, float low, float high, float& (*member)(Config&)) {
+  const Option named = option;
+  option.set = [=](Config& c, Values v) {
+    member(c) = glm::radians(parse_number(named, v.front(), low, high));
+  };
+  option.get = [=](const Config& c) {
+    return shortest(std::round(glm::degrees(member(const_cast<Config&>(c))) * 1e4f) / 1e4f);
+  };
+  option.default_text = option.get(Config{}).dump();
+  return option;
+}
+
+Option views_option() {
+  Option option{.name = "views",
+                .aliases = {},
+                .group = "Views",
+                .placeholder = "4|9|16",
+                .help = "Number of views around the asset; they are edited together as a square grid.",
+                .default_text = "9",
+                .stages = kRenderStage};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    const int n = parse_number(named, v.front(), 1, 16);
+    if (n != 1 && n != 4 && n != 9 && n != 16)
+      refuse(named, "4, 9 or 16 (or 1 for a single view)", v.front());
+    c.orbit.num_views = n;
+  };
+  option.get = [](const Config& c) { return json(c.orbit.num_views); };
+  return option;
+}
+
+Option exposure_option() {
+  Option option{
+      .name = "exposure",
+      .aliases = {},
+      .group = "Views",
+      .placeholder = "auto|EV",
+      .help = "Exposure of all views, in stops; auto brings the object's mean luminance to middle grey.",
+      .default_text = "auto",
+      .stages = kRenderStage};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    if (v.front() == "auto")
+      c.exposure_ev.reset();
+    else
+      c.exposure_ev = parse_number(named, v.front(), -20.0f, 20.0f);
+  };
+  option.get = [](const Config& c) { return c.exposure_ev ? shortest(*c.exposure_ev) : json("auto"); };
+  return option;
+}
+
+Option materials_option() {
+  Option option{.name = "material",
+                .aliases = {},
+                .group = "Input and output",
+                .placeholder = "NAME...",
+                .help = "Only these materials may change, by the names that `patina info` shows.",
+                .default_text = "all with usable UVs",
+                .stages = kFitStage | kReportStage,
+                .is_list = true};
+  option.set = [](Config& c, Values v) { c.materials.assign(v.begin(), v.end()); };
+  option.get = [](const Config& c) { return json(c.materials); };
+  return option;
+}
+
+Option fit_option() {
+  Option option{
+      .name = "fit",
+      .aliases = {},
+      .group = "Inverse rendering",
+      .placeholder = "MAP...",
+      .help =
+          "Which maps may change: base_color, roughness, normal, metallic (separated by spaces or commas).",
+      .default_text = "base_color roughness normal",
+      .stages = kFitStage,
+      .is_list = true};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    inverse::FitOptions& fit = c.fit;
+    fit.fit_base_color = fit.fit_roughness = fit.fit_normal = fit.fit_metallic = false;
+    for (const std::string& list : v)
+      for (size_t begin = 0, end; begin <= list.size(); begin = end + 1) {
+        end = std::min(list.find(',', begin), list.size());
+        const std::string name = list.substr(begin, end - begin);
+        if (name == "base_color")
+          fit.fit_base_color = true;
+        else if (name == "roughness")
+          fit.fit_roughness = true;
+        else if (name == "normal")
+          fit.fit_normal = true;
+        else if (name == "metallic")
+          fit.fit_metallic = true;
+        else
+          refuse(named, "base_color, roughness, normal or metallic", name);
+      }
+  };
+  option.get = [](const Config& c) {
+    json list = json::array();
+    if (c.fit.fit_base_color) list.push_back("base_color");
+    if (c.fit.fit_roughness) list.push_back("roughness");
+    if (c.fit.fit_normal) list.push_back("normal");
+    if (c.fit.fit_metallic) list.push_back("metallic");
+    return list;
+  };
+  return option;
+}
+
+std::vector<Option> make_options() {
+  const std::string io = "Input and output", views = "Views", model = "Model", edit = "Edit",
+                    priors = "Consistency between views", fit = "Inverse rendering", machine = "Machine";
+  const Names<Scheduler> schedulers = {{"ddim", Scheduler::kDdim},
+                                       {"pndm", Scheduler::kPndm},
+                                       {"euler", Scheduler::kEuler},
+                                       {"euler-a", Scheduler::kEulerAncestral},
+                                       {"dpm++2m", Scheduler::kDpmSolverPp2m},
+                                       {"dpm++2m-karras", Scheduler::kDpmSolverPp2mKarras},
+                                       {"unipc", Scheduler::kUniPc}};
+  std::vector<Option> list;
+  const auto add = [&](Option option) { list.push_back(std::move(option)); };
+
+  add(text_option(
+      {.name = "prompt",
+       .aliases = {"-p"},
+       .group = edit,
+       .placeholder = "TEXT",
+       .help = "What the asset shall look like, e.g. \"a rusty old kettle\".",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.detail.prompt; }));
+  add(text_option(
+      {.name = "negative-prompt",
+       .aliases = {"-n"},
+       .group = edit,
+       .placeholder = "TEXT",
+       .help = "What it shall not look like.",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.detail.negative_prompt; }));
+  add(number_option<float>(
+      {.name = "strength",
+       .aliases = {},
+       .group = edit,
+       .placeholder = "S",
+       .help = "How far the views may move away from the renders: share of the steps that is run, 0.01 to 1.",
+       .stages = kDetailStage},
+      0.01f, 1.0f, [](Config & c) -> auto& { return c.detail.strength; }));
+  add(number_option<float>(
+      {.name = "guidance-scale",
+       .aliases = {"--cfg-scale"},
+       .group = edit,
+       .placeholder = "G",
+       .help = "How strongly the prompt acts (classifier-free guidance); 1 switches guidance off and halves "
+               "the time.",
+       .stages = kDetailStage},
+      1.0f, 50.0f, [](Config & c) -> auto& { return c.detail.guidance_scale; }));
+  add(number_option<int>(
+      {.name = "steps",
+       .aliases = {"-s"},
+       .group = edit,
+       .placeholder = "N",
+       .help = "Steps of the scheduler; steps × strength of them are run.",
+       .stages = kDetailStage},
+      1, 1000, [](Config & c) -> auto& { return c.detail.num_steps; }));
+  add(choice_option<Scheduler>(
+      {.name = "scheduler",
+       .aliases = {"--sampler"},
+       .group = edit,
+       .placeholder = "",
+       .help = "How the noise is taken away step by step.",
+       .stages = kDetailStage},
+      schedulers, [](Config & c) -> auto& { return c.detail.scheduler; }));
+  add(number_option<float>(
+      {.name = "tile-scale",
+       .aliases = {},
+       .group = edit,
+       .placeholder = "X",
+       .help = "Weight of ControlNet tile, which holds on to the render's look.",
+       .stages = kDetailStage},
+      0.0f, 4.0f, [](Config & c) -> auto& { return c.detail.tile_scale; }));
+  add(number_option<float>(
+      {.name = "normal-scale",
+       .aliases = {},
+       .group = edit,
+       .placeholder = "X",
+       .help = "Weight of ControlNet normal, which holds on to the shape.",
+       .stages = kDetailStage},
+      0.0f, 4.0f, [](Config & c) -> auto& { return c.detail.normal_scale; }));
+
+  add(text_option(
+      {.name = "output",
+       .aliases = {"-o"},
+       .group = io,
+       .placeholder = "OUT.glb",
+       .help = "Where the enhanced asset goes: .glb, .gltf or .obj."},
+      [](Config & c) -> auto& { return c.output; }));
+  add(text_option(
+      {.name = "run",
+       .aliases = {},
+       .group = io,
+       .placeholder = "DIR",
+       .help = "Run folder: everything in between, kept. The same command continues a killed run there.",
+       .default_text = "beside the output, OUT.patina-run"},
+      [](Config & c) -> auto& { return c.run; }));
+  add(materials_option());
+
+  add(text_option(
+      {.name = "model",
+       .aliases = {"-m"},
+       .group = model,
+       .placeholder = "DIR",
+       .help = "Diffusion model: a folder in the diffusers layout (Stable Diffusion 1.5 and its kin).",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.model.model; }));
+  add(text_option(
+      {.name = "controlnet-tile",
+       .aliases = {},
+       .group = model,
+       .placeholder = "DIR",
+       .help = "ControlNet that is given the render.",
+       .default_text = "MODEL/controlnet_tile",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.model.controlnet_tile; }));
+  add(text_option(
+      {.name = "controlnet-normal",
+       .aliases = {},
+       .group = model,
+       .placeholder = "DIR",
+       .help = "ControlNet that is given the normals.",
+       .default_text = "MODEL/controlnet_normal",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.model.controlnet_normal; }));
+  add(text_option(
+      {.name = "vae",
+       .aliases = {},
+       .group = model,
+       .placeholder = "DIR",
+       .help = "VAE to use in place of the model's own.",
+       .default_text = "MODEL/vae",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.model.vae; }));
+  add(choice_option<Dtype>(
+      {.name = "dtype",
+       .aliases = {},
+       .group = model,
+       .placeholder = "",
+       .help = "Arithmetic of the networks; auto takes bf16 where it is faster here.",
+       .stages = kDetailStage},
+      {{"auto", Dtype::kAuto}, {"f32", Dtype::kF32}, {"bf16", Dtype::kBf16}},
+      [](Config & c) -> auto& { return c.dtype; }));
+
+  add(views_option());
+  add(number_option<int>(
+      {.name = "resolution",
+       .aliases = {},
+       .group = views,
+       .placeholder = "PIXELS",
+       .help = "Width and height of one view, pixels; a multiple of 8.",
+       .stages = kRenderStage},
+      64, 4096, [](Config & c) -> auto& { return c.orbit.resolution; }));
+  add(elevations_option());
+  add(degrees_option({.name = "azimuth",
+                      .aliases = {},
+                      .group = views,
+                      .placeholder = "DEGREES",
+                      .help = "Where the orbit starts, degrees about +Y; 0 looks at the asset's front (+Z).",
+                      .stages = kRenderStage},
+                     -360.0f, 360.0f, [](Config& c) -> float& { return c.orbit.azimuth_start; }));
+  add(degrees_option({.name = "fov",
+                      .aliases = {},
+                      .group = views,
+                      .placeholder = "DEGREES",
+                      .help = "Field of view of the cameras, degrees.",
+                      .stages = kRenderStage},
+                     5.0f, 120.0f, [](Config& c) -> float& { return c.orbit.fov_y; }));
+  add(number_option<float>(
+      {.name = "distance",
+       .aliases = {},
+       .group = views,
+       .placeholder = "METRES",
+       .help = "From the asset's centre to the cameras, metres; 0 makes the bounding sphere just fit.",
+       .stages = kRenderStage},
+      0.0f, 1e12f, [](Config & c) -> auto& { return c.orbit.distance; }));
+  add(text_option(
+      {.name = "cameras",
+       .aliases = {},
+       .group = views,
+       .placeholder = "FILE.json",
+       .help = "Explicit cameras in place of the orbit, as views/cameras.json of a run folder writes them.",
+       .stages = kRenderStage},
+      [](Config & c) -> auto& { return c.cameras; }));
+  add(text_option(
+      {.name = "environment",
+       .aliases = {},
+       .group = views,
+       .placeholder = "FILE.hdr",
+       .help = "Light from around: an equirectangular .hdr or .exr.",
+       .default_text = "built-in studio",
+       .stages = kRenderStage | kFitStage | kReportStage},
+      [](Config & c) -> auto& { return c.environment; }));
+  add(text_option(
+      {.name = "scene",
+       .aliases = {},
+       .group = views,
+       .placeholder = "CONTEXT.glb",
+       .help = "Floor, neighbours and lights around the asset: rendered, never changed.",
+       .stages = kRenderStage | kDetailStage | kFitStage | kReportStage},
+      [](Config & c) -> auto& { return c.scene; }));
+  add(exposure_option());
+  add(number_option<int>(
+      {.name = "samples",
+       .aliases = {},
+       .group = views,
+       .placeholder = "N",
+       .help = "Light paths a pixel when the views are rendered.",
+       .stages = kRenderStage | kReportStage},
+      1, 65536, [](Config & c) -> auto& { return c.samples_per_pixel; }));
+  add(number_option<int>(
+      {.name = "max-depth",
+       .aliases = {},
+       .group = views,
+       .placeholder = "N",
+       .help = "Longest light path, in bounces; 1 is direct light only.",
+       .stages = kRenderStage | kFitStage | kReportStage},
+      1, 64, [](Config & c) -> auto& { return c.max_depth; }));
+  add(choice_option<BsdfModel>(
+      {.name = "bsdf",
+       .aliases = {},
+       .group = views,
+       .placeholder = "",
+       .help = "How surfaces reflect: as glTF viewers show them, or Burley's principled model.",
+       .stages = kRenderStage | kFitStage | kReportStage},
+      {{"gltf", BsdfModel::kGltf}, {"principled", BsdfModel::kPrincipled}},
+      [](Config & c) -> auto& { return c.bsdf; }));
+
+  add(choice_option<NoiseMode>(
+      {.name = "noise",
+       .aliases = {},
+       .group = priors,
+       .placeholder = "",
+       .help = "Initial noise: anchored on the surface (exact, or the paper's sampling) or independent in "
+               "every view.",
+       .stages = kDetailStage},
+      {{"exact", NoiseMode::kExact}, {"paper", NoiseMode::kPaper}, {"independent", NoiseMode::kIndependent}},
+      [](Config & c) -> auto& { return c.noise; }));
+  add(number_option<float>(
+      {.name = "bias",
+       .aliases = {},
+       .group = priors,
+       .placeholder = "W",
+       .help = "Attention bias w between latent pixels that see the same surface point; 0 switches it off, "
+               "1.2 to 1.8 is usual.",
+       .stages = kDetailStage},
+      -20.0f, 20.0f, [](Config & c) -> auto& { return c.detail.bias_weight; }));
+  add(choice_option<BiasScaling>(
+      {.name = "bias-scaling",
+       .aliases = {},
+       .group = priors,
+       .placeholder = "",
+       .help = "Whether w is divided by the square root of the head dimension (paper) or added after it.",
+       .stages = kDetailStage},
+      {{"paper", BiasScaling::kPaper}, {"additive", BiasScaling::kAdditive}},
+      [](Config & c) -> auto& { return c.detail.bias_scaling; }));
+
+  add(number_option<int>(
+      {.name = "fit-iterations",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "N",
+       .help = "Steps of the optimiser that carries the detail into the textures.",
+       .stages = kFitStage},
+      1, 100000, [](Config & c) -> auto& { return c.fit.iterations; }));
+  add(number_option<int>(
+      {.name = "texture-size",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "TEXELS",
+       .help = "Width and height of the new textures, texels; 0 keeps the asset's own sizes.",
+       .stages = kFitStage},
+      0, 8192, [](Config & c) -> auto& { return c.fit.texture_size; }));
+  add(fit_option());
+  add(number_option<float>(
+      {.name = "fit-rate",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "X",
+       .help = "Learning rate of the optimiser (Adam).",
+       .stages = kFitStage},
+      1e-5f, 1.0f, [](Config & c) -> auto& { return c.fit.learning_rate; }));
+  add(number_option<int>(
+      {.name = "light-samples",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "N",
+       .help = "Directions of incident light that are kept for every pixel.",
+       .stages = kFitStage},
+      4, 1024, [](Config & c) -> auto& { return c.fit.light_samples; }));
+  add(number_option<int>(
+      {.name = "boundary",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "PIXELS",
+       .help = "Pixels beside silhouettes and depth edges that are not trusted.",
+       .stages = kFitStage},
+      0, 64, [](Config & c) -> auto& { return c.fit.boundary_pixels; }));
+
+  add(number_option<int>(
+      {.name = "turntable",
+       .aliases = {},
+       .group = io,
+       .placeholder = "FRAMES",
+       .help = "Frames of the report's turntable; 0 leaves it out.",
+       .stages = kReportStage},
+      0, 360, [](Config & c) -> auto& { return c.turntable_frames; }));
+  add(number_option<uint64_t>(
+      {.name = "seed",
+       .aliases = {},
+       .group = machine,
+       .placeholder = "N",
+       .help = "Seed of all random numbers: the same seed gives the same bytes on the same machine.",
+       .stages = kEveryStage},
+      0, std::numeric_limits<uint64_t>::max(), [](Config & c) -> auto& { return c.seed; }));
+  add(number_option<int>(
+      {.name = "threads",
+       .aliases = {"-j"},
+       .group = machine,
+       .placeholder = "N",
+       .help = "Processors to use; 0 uses all."},
+      0, 1024, [](Config & c) -> auto& { return c.num_threads; }));
+  return list;
+}
+
+std::vector<std::string> as_strings(const json& value, const std::string& context) {
+  const auto text = [&](const json& v) {
+    if (v.is_string()) return v.get<std::string>();
+    if (v.is_number()) return v.dump();
+    throw Error(ErrorCode::kFormat, context,
+                fmt::format("expected text or a number, found {}", v.type_name()));
+  };
+  std::vector<std::string> out;
+  if (value.is_array())
+    for (const json& v : value) out.push_back(text(v));
+  else
+    out.push_back(text(value));
+  return out;
+}
+
+}  // namespace
+
+const std::vector<Option>& options() {
+  static const std::vector<Option> list = make_options();
+  return list;
+}
+
+const Option* find_option(std::string_view name) {
+  for (const Option& option : options())
+    if (option.name == name) return &option;
+  return nullptr;
+}
+
+json to_json(const Config& config) {
+  return values_read_by(config, ~0u);
+}
+
+void apply_json(Config& config, const json& values, const std::string& context) {
+  if (!values.is_object()) throw Error(ErrorCode::kFormat, context, "expected an object of options");
+  for (const auto& [name, value] : values.items()) {
+    const Option* option = find_option(name);
+    if (!option)
+      throw Error(ErrorCode::kFormat, context, fmt::format("unknown option '{}'", printable(name)));
+    const std::vector<std::string> texts = as_strings(value, context + ": " + name);
+    if (!texts.empty()) option->set(config, texts);
+  }
+}
+
+json values_read_by(const Config& config, unsigned stages) {
+  json values = json::object();
+  for (const Option& option : options())
+    if (stages == ~0u || (option.stages & stages)) values[option.name] = option.get(config);
+  return values;
+}
+
+}  // namespace patina::pipeline

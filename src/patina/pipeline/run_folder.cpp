@@ -1,0 +1,170 @@
+#include "patina/pipeline/run_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+
+#include <fmt/format.h>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+
+namespace patina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// Largest resident memory of this process since the last reset, in MB. Linux resets the mark when 5 is
+// written to clear_refs; where that is forbidden the mark is that of the whole process, an upper bound.
+void reset_peak_memory() {
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+double peak_memory_mb() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return std::strtod(line.c_str() + 6, nullptr) / 1024.0;
+  return 0;
+}
+
+json to_json(const StageRecord& stage) {
+  return {{"name", stage.name},
+          {"key", stage.key},
+          {"outputs", stage.outputs},
+          {"seconds", stage.seconds},
+          {"peak_rss_mb", stage.peak_rss_mb},
+          {"metrics", stage.metrics},
+          {"warnings", stage.warnings}};
+}
+
+StageRecord stage_from_json(const json& j) {
+  return {.name = j.at("name"),
+          .key = j.at("key"),
+          .outputs = j.at("outputs"),
+          .seconds = j.at("seconds"),
+          .peak_rss_mb = j.at("peak_rss_mb"),
+          .metrics = j.at("metrics"),
+          .warnings = j.at("warnings")};
+}
+
+std::string checkpoint_name(std::string_view stage) {
+  return fmt::format(".{}.checkpoint", stage);
+}
+
+}  // namespace
+
+json read_json(const fs::path& path) {
+  try {
+    return json::parse(read_text_file(path));
+  } catch (const json::exception& e) {
+    throw Error(ErrorCode::kFormat, path.string(), fmt::format("is not valid JSON: {}", e.what()));
+  }
+}
+
+void write_json(const fs::path& path, const json& values) {
+  write_file(path, values.dump(2) + "\n");
+}
+
+RunFolder::RunFolder(const fs::path& path) : path_(path) {
+  std::error_code failure;
+  fs::create_directories(path_, failure);
+  if (failure)
+    throw Error(ErrorCode::kIo, path_.string(), "the run folder cannot be made: " + failure.message());
+  lock_ = ::open((path_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (lock_ < 0)
+    throw Error(ErrorCode::kIo, path_.string(),
+                fmt::format("the run folder cannot be written: {}", std::strerror(errno)));
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    ::close(lock_);
+    throw Error(ErrorCode::kIo, path_.string(),
+                "another patina works in this run folder; wait for it, or choose another with --run");
+  }
+  if (!fs::exists(path_ / "stages.json")) return;
+  try {
+    for (const json& stage : read_json(path_ / "stages.json")) stages_.push_back(stage_from_json(stage));
+  } catch (const json::exception& e) {
+    throw Error(ErrorCode::kFormat, (path_ / "stages.json").string(),
+                fmt::format("is not a record of stages ({}); remove it to run all stages again", e.what()));
+  }
+}
+
+RunFolder::~RunFolder() {
+  ::close(lock_);
+}
+
+const StageRecord* RunFolder::stage(std::string_view name) const {
+  const auto found =
+      std::find_if(stages_.begin(), stages_.end(), [&](const StageRecord& s) { return s.name == name; });
+  return found == stages_.end() ? nullptr : &*found;
+}
+
+void RunFolder::save_stages() const {
+  json list = json::array();
+  for (const StageRecord& stage : stages_) list.push_back(to_json(stage));
+  write_json(path_ / "stages.json", list);
+}
+
+const StageRecord& RunFolder::run_stage(std::string_view name, const std::string& key,
+                                        const Progress& progress, const std::function<StageResult()>& work) {
+  if (const StageRecord* last = stage(name); last && last->key == key) {
+    const bool complete = std::all_of(last->outputs.begin(), last->outputs.end(),
+                                      [&](const std::string& output) { return fs::exists(path_ / output); });
+    if (complete) {
+      for (const std::string& warning : last->warnings) progress.warn(warning);
+      return *last;
+    }
+  }
+  progress.throw_if_stopped();
+  reset_peak_memory();
+  const auto start = std::chrono::steady_clock::now();
+  StageResult result = work();
+  StageRecord record{
+      .name = std::string(name),
+      .key = key,
+      .outputs = std::move(result.outputs),
+      .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+      .peak_rss_mb = peak_memory_mb(),
+      .metrics = std::move(result.metrics),
+      .warnings = std::move(result.warnings)};
+  // A stage takes its old place; what follows it is judged by its own key.
+  const auto place =
+      std::find_if(stages_.begin(), stages_.end(), [&](const StageRecord& s) { return s.name == name; });
+  if (place == stages_.end())
+    stages_.push_back(std::move(record));
+  else
+    *place = std::move(record);
+  save_stages();
+  std::error_code ignored;
+  fs::remove(path_ / checkpoint_name(name), ignored);
+  return *stage(name);
+}
+
+void RunFolder::save_checkpoint(std::string_view stage, const std::string& key, int step,
+                                const std::vector<uint8_t>& bytes) const {
+  const std::string header = json{{"key", key}, {"step", step}, {"hash", hash_bytes(bytes)}}.dump() + "\n";
+  std::vector<uint8_t> file(header.begin(), header.end());
+  file.insert(file.end(), bytes.begin(), bytes.end());
+  write_file(path_ / checkpoint_name(stage), file);
+}
+
+std::optional<RunFolder::SavedCheckpoint> RunFolder::load_checkpoint(std::string_view stage,
+                                                                     const std::string& key) const {
+  const fs::path path = path_ / checkpoint_name(stage);
+  if (!fs::exists(path)) return std::nullopt;
+  const std::vector<uint8_t> file = read_file(path, ~uint64_t{0});
+  const auto line_end = std::find(file.begin(), file.end(), '\n');
+  const json header = json::parse(file.begin(), line_end, nullptr, false);
+  if (line_end == file.end() || !header.is_object() || header.value("key", "") != key) return std::nullopt;
+  SavedCheckpoint saved{.step = header.value("step", 0), .bytes = {line_end + 1, file.end()}};
+  if (header.value("hash", "") != hash_bytes(saved.bytes)) return std::nullopt;
+  return saved;
+}
+
+}  // namespace patina::pipeline

@@ -1,0 +1,83 @@
+// The run folder: everything between asset and result, on disk, so that a stage whose inputs have not changed
+// is not run again, a killed run continues, and an artist can edit pictures between two stages.
+//
+//   config.json          every option's value, version, asset
+//   stages.json          per stage: the key of its inputs, its outputs, seconds, peak memory, metrics
+//   views/  detail/  textures/  metrics.json  report.html  turntable.webp
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "patina/base/progress.h"
+
+namespace patina::pipeline {
+
+/// What a stage left behind besides its files.
+struct StageRecord {
+  std::string name;
+  std::string key;                   // hash of everything the stage read
+  std::vector<std::string> outputs;  // paths relative to the run folder
+  double seconds = 0;
+  double peak_rss_mb = 0;  // largest resident memory while the stage ran
+  nlohmann::json metrics = nlohmann::json::object();
+  std::vector<std::string> warnings;  // shown again in the report
+};
+
+/// One process at a time owns a run folder: the constructor takes a lock that ends with the process.
+class RunFolder {
+ public:
+  /// Makes the folder if it is missing. Throws Error{kIo} if it cannot be written or another process holds
+  /// it.
+  explicit RunFolder(const std::filesystem::path& path);
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path file(std::string_view relative) const { return path_ / relative; }
+
+  /// Runs `work` unless the last run of the stage had the same key and all its outputs are still there.
+  /// `work` writes its files and returns their paths relative to the folder, with metrics and warnings.
+  /// Records and returns the stage.
+  struct StageResult {
+    std::vector<std::string> outputs;
+    nlohmann::json metrics = nlohmann::json::object();
+    std::vector<std::string> warnings;
+  };
+  const StageRecord& run_stage(std::string_view name, const std::string& key, const Progress& progress,
+                               const std::function<StageResult()>& work);
+
+  /// Records of the stages that have run, in the order of the flow; nullptr if `name` has not.
+  const std::vector<StageRecord>& stages() const { return stages_; }
+  const StageRecord* stage(std::string_view name) const;
+
+  /// Partial results of a long stage, kept under the stage's key: a checkpoint written for other inputs is
+  /// not returned.
+  void save_checkpoint(std::string_view stage, const std::string& key, int step,
+                       const std::vector<uint8_t>& bytes) const;
+  struct SavedCheckpoint {
+    int step = 0;
+    std::vector<uint8_t> bytes;
+  };
+  std::optional<SavedCheckpoint> load_checkpoint(std::string_view stage, const std::string& key) const;
+
+ private:
+  void save_stages() const;
+
+  std::filesystem::path path_;
+  int lock_ = -1;
+  std::vector<StageRecord> stages_;
+};
+
+/// A JSON file; throws Error{kFormat} naming the file where it is not JSON.
+nlohmann::json read_json(const std::filesystem::path& path);
+void write_json(const std::filesystem::path& path, const nlohmann::json& json);
+
+}  // namespace patina::pipeline

@@ -1,0 +1,125 @@
+// The second stage: noise and correspondences from the geometry, then the diffusion model over the whole
+// grid.
+#include <fmt/format.h>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/correspond/consistency.h"
+#include "patina/correspond/correspondences.h"
+#include "patina/correspond/noise.h"
+#include "patina/image/image_io.h"
+#include "patina/pipeline/options.h"
+#include "patina/pipeline/stages.h"
+
+namespace patina::pipeline {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+// Weights are gigabytes: which file, how large, how old tells whether a model changed.
+std::string describe_files(const fs::path& path) {
+  std::string text;
+  const auto add = [&](const fs::path& file) {
+    std::error_code ignored;
+    text += fmt::format("{} {} {}\n", file.string(), fs::file_size(file, ignored),
+                        fs::last_write_time(file, ignored).time_since_epoch().count());
+  };
+  if (!fs::is_directory(path)) {
+    if (!path.empty()) add(path);
+    return text;
+  }
+  std::vector<fs::path> files;
+  for (const auto& entry :
+       fs::recursive_directory_iterator(path, fs::directory_options::skip_permission_denied))
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) add(file);
+  return text;
+}
+
+std::string detail_key(const Workbench& bench, const RenderedViews& views, const Config& config) {
+  std::string key = values_read_by(config, kDetailStage).dump() + bench.scene_hash +
+                    cameras_to_json(bench.cameras).dump() + PATINA_VERSION;
+  for (const std::vector<Image>* images : {&views.tile, &views.normal})
+    for (const Image& image : *images)
+      key += hash_bytes(
+          {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
+  const diffusion::ModelPaths& m = config.model;
+  for (const fs::path& path : {m.model, m.vae, m.controlnet_tile, m.controlnet_normal})
+    key += describe_files(path);
+  return hash_text(key);
+}
+
+// The view whose noise is farthest from white tells whether the noise can be trusted.
+json noise_metrics(const correspond::NoiseField& noise, int grid) {
+  json worst = {{"mean", 0.0f}, {"variance", 1.0f}, {"autocorrelation", 0.0f}, {"ks_p", 1.0f}};
+  const auto replace_if_farther = [&](const char* name, float value, float ideal) {
+    if (std::abs(value - ideal) > std::abs(worst[name].get<float>() - ideal)) worst[name] = value;
+  };
+  for (const correspond::NoiseStatistics& view : correspond::noise_statistics(noise, grid)) {
+    replace_if_farther("mean", view.mean, 0);
+    replace_if_farther("variance", view.variance, 1);
+    replace_if_farther("autocorrelation", view.autocorrelation_x, 0);
+    replace_if_farther("autocorrelation", view.autocorrelation_y, 0);
+    replace_if_farther("ks_p", view.kolmogorov_smirnov_p, 1);
+  }
+  return worst;
+}
+
+}  // namespace
+
+std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& views, const Config& config,
+                                RunFolder& run, const Progress& progress) {
+  const std::string key = detail_key(bench, views, config);
+  run.run_stage("detail", key, progress, [&] {
+    const diffusion::Model model(config.model, {.dtype = config.dtype, .num_threads = config.num_threads});
+    if (bench.cameras[0].width % model.latent_scale() || bench.cameras[0].height % model.latent_scale())
+      throw Error(ErrorCode::kUsage, "--resolution",
+                  fmt::format("this model needs a multiple of {}", model.latent_scale()));
+
+    const correspond::NoiseField noise =
+        correspond::make_noise(*bench.scene, bench.cameras, model.latent_scale(),
+                               {.mode = config.noise, .seed = config.seed}, progress);
+    diffusion::DetailInputs inputs{.grid = views.set.grid,
+                                   .tile_views = views.tile,
+                                   .normal_views = views.normal,
+                                   .noise = noise.values,
+                                   .bias_levels = {}};
+    if (config.detail.bias_weight != 0)
+      inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress);
+
+    diffusion::DetailOptions options = config.detail;
+    options.seed = config.seed;
+    diffusion::DetailHooks hooks;
+    hooks.on_checkpoint = [&](const diffusion::Checkpoint& c) {
+      run.save_checkpoint("detail", key, c.next_step, c.bytes);
+    };
+    if (auto saved = run.load_checkpoint("detail", key))
+      hooks.resume = diffusion::Checkpoint{.next_step = saved->step, .bytes = std::move(saved->bytes)};
+    const std::vector<Image> edited = diffusion::generate_detail(model, inputs, options, hooks, progress);
+
+    RunFolder::StageResult result;
+    for (size_t v = 0; v < edited.size(); ++v) {
+      result.outputs.push_back(numbered("detail/edited", v, ".png"));
+      write_image(run.file(result.outputs.back()), edited[v]);
+    }
+    result.metrics = {{"noise", noise_metrics(noise, views.set.grid)}, {"model", model.description()}};
+    return result;
+  });
+  return load_edited(views, run);
+}
+
+std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run) {
+  if (!run.stage("detail"))
+    throw Error(ErrorCode::kNotFound, run.path().string(),
+                "has no edited views yet; run `patina detail` on it first");
+  std::vector<Image> edited;
+  for (size_t v = 0; v < views.tile.size(); ++v)
+    edited.push_back(read_rgb_sized(run.file(numbered("detail/edited", v, ".png")), views.tile[v].width,
+                                    views.tile[v].height));
+  return edited;
+}
+
+}  // namespace patina::pipeline

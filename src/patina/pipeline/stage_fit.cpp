@@ -1,0 +1,151 @@
+// The third stage: inverse rendering carries the edit into the texture maps.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/image/color.h"
+#include "patina/image/image_io.h"
+#include "patina/inverse/fit.h"
+#include "patina/pipeline/options.h"
+#include "patina/pipeline/stages.h"
+
+namespace patina::pipeline {
+
+using asset::ChangedMaps;
+using asset::Map;
+using asset::MaterialMaps;
+using nlohmann::json;
+
+namespace {
+
+// The maps that a fit may change: their names in files, where they stand, and how they are stored.
+enum class Encoding { kSrgb, kLinear, kNormal };
+struct Slot {
+  const char* name;
+  Map MaterialMaps::*map;
+  bool ChangedMaps::*changed;
+  Encoding encoding;
+};
+constexpr std::array<Slot, 4> kSlots = {{
+    {"base_color", &MaterialMaps::base_color, &ChangedMaps::base_color, Encoding::kSrgb},
+    {"roughness", &MaterialMaps::roughness, &ChangedMaps::roughness, Encoding::kLinear},
+    {"metallic", &MaterialMaps::metallic, &ChangedMaps::metallic, Encoding::kLinear},
+    {"normal", &MaterialMaps::normal, &ChangedMaps::normal, Encoding::kNormal},
+}};
+
+Image to_picture(const Image& texels, Encoding encoding) {
+  if (encoding == Encoding::kSrgb) return srgb_from_linear(texels);
+  Image picture = texels;
+  if (encoding == Encoding::kNormal)
+    for (float& value : picture.pixels) value = 0.5f + 0.5f * value;
+  return picture;
+}
+
+Image to_texels(const Image& picture, Encoding encoding) {
+  if (encoding == Encoding::kSrgb) return linear_from_srgb(picture);
+  Image texels = picture;
+  if (encoding == Encoding::kNormal)
+    for (size_t i = 0; i < texels.num_pixels(); ++i) {
+      float* p = texels.pixels.data() + 3 * i;
+      vec3 n = 2.0f * vec3(p[0], p[1], p[2]) - 1.0f;
+      n.z = std::max(n.z, 1e-3f);  // a painted-over texel may point into the surface
+      n = glm::normalize(n);
+      p[0] = n.x, p[1] = n.y, p[2] = n.z;
+    }
+  return texels;
+}
+
+// A material's name as part of a file name: letters, digits, '-', '_'; numbered, so that two materials never
+// share a file.
+std::string texture_file(size_t material, const std::string& name, const char* slot) {
+  std::string safe;
+  for (const char c : name.substr(0, 40))
+    safe += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '_';
+  return fmt::format("textures/{:02}_{}_{}.png", material, safe, slot);
+}
+
+std::string fit_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
+                    const Config& config) {
+  std::string key = values_read_by(config, kFitStage).dump() + bench.scene_hash +
+                    cameras_to_json(bench.cameras).dump() + fmt::format("{}", views.set.exposure_ev) +
+                    PATINA_VERSION;
+  for (const Image& image : edited)
+    key += hash_bytes(
+        {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
+  return hash_text(key);
+}
+
+}  // namespace
+
+FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
+                          const Config& config, RunFolder& run, const Progress& progress) {
+  const std::string key = fit_key(bench, views, edited, config);
+  run.run_stage("fit", key, progress, [&] {
+    inverse::FitOptions options = config.fit;
+    options.materials = bench.enhanced;
+    options.max_depth = config.max_depth;
+    options.seed = config.seed;
+    inverse::FitHooks hooks;
+    hooks.on_checkpoint = [&](const inverse::FitCheckpoint& c) {
+      run.save_checkpoint("fit", key, c.next_iteration, c.bytes);
+    };
+    if (auto saved = run.load_checkpoint("fit", key))
+      hooks.resume = inverse::FitCheckpoint{.next_iteration = saved->step, .bytes = std::move(saved->bytes)};
+    // The fit leaves its result in the scene it is given, so the original is put back afterwards.
+    const inverse::FitResult fitted =
+        inverse::fit_materials(*bench.scene, views.set, edited, options, hooks, progress);
+    bench.scene->set_asset_materials(bench.maps);
+
+    RunFolder::StageResult result;
+    result.metrics["maps"] = json::array();
+    for (size_t m = 0; m < fitted.maps.size(); ++m)
+      for (const Slot& slot : kSlots) {
+        if (!(fitted.changed[m].*slot.changed)) continue;
+        const std::string file = texture_file(m, bench.maps[m].name, slot.name);
+        write_image(run.file(file), to_picture((fitted.maps[m].*slot.map).texels, slot.encoding));
+        result.outputs.push_back(file);
+        result.metrics["maps"].push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
+      }
+    result.metrics["loss"] = fitted.loss;
+    result.metrics["training_psnr"] = fitted.psnr;
+    return result;
+  });
+  return load_fitted(bench, run);
+}
+
+FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run) {
+  const StageRecord* stage = run.stage("fit");
+  if (!stage)
+    throw Error(ErrorCode::kNotFound, run.path().string(),
+                "has no fitted textures yet; run `patina fit` on it first");
+  FittedMaterials fitted{.maps = bench.maps, .changed = std::vector<ChangedMaps>(bench.maps.size())};
+  for (const json& entry : stage->metrics.at("maps")) {
+    const size_t m = entry.at("material");
+    const auto slot =
+        std::find_if(kSlots.begin(), kSlots.end(), [&](const Slot& s) { return entry.at("slot") == s.name; });
+    if (m >= fitted.maps.size() || slot == kSlots.end())
+      throw Error(ErrorCode::kFormat, run.file("stages.json").string(),
+                  "the textures belong to another asset; run `patina fit` again");
+    const auto path = run.file(entry.at("file").get<std::string>());
+    const Image stored = read_image(path);
+    Map& map = fitted.maps[m].*(slot->map);
+    const int channels = slot->encoding == Encoding::kLinear ? 1 : 3;
+    if (stored.channels < channels)
+      throw Error(ErrorCode::kFormat, path.string(),
+                  fmt::format("expected {} channels, found {}", channels, stored.channels));
+    Image picture(stored.width, stored.height, channels);
+    for (size_t i = 0; i < picture.num_pixels(); ++i)
+      for (int c = 0; c < channels; ++c)
+        picture.pixels[static_cast<size_t>(channels) * i + static_cast<size_t>(c)] =
+            stored.pixels[static_cast<size_t>(stored.channels) * i + static_cast<size_t>(c)];
+    map.texels = to_texels(picture, slot->encoding);
+    fitted.changed[m].*(slot->changed) = true;
+  }
+  return fitted;
+}
+
+}  // namespace patina::pipeline

@@ -1,0 +1,105 @@
+// The first stage: the asset seen from every camera, as radiance and as the two control images.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/image/image_io.h"
+#include "patina/pipeline/options.h"
+#include "patina/pipeline/stages.h"
+
+namespace patina::pipeline {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string numbered(std::string_view prefix, size_t index, std::string_view extension) {
+  return fmt::format("{}_{:02}{}", prefix, index, extension);
+}
+
+Image read_rgb_sized(const fs::path& path, int width, int height) {
+  const Image stored = read_image(path);
+  if (stored.width != width || stored.height != height || stored.channels < 3)
+    throw Error(ErrorCode::kFormat, path.string(),
+                fmt::format("expected {} x {} RGB, found {} x {} with {} channel(s); save an edited picture "
+                            "at its old size, or run the stage again",
+                            width, height, stored.width, stored.height, stored.channels));
+  Image rgb(width, height, 3);
+  for (size_t i = 0; i < rgb.num_pixels(); ++i)
+    for (size_t c = 0; c < 3; ++c)
+      rgb.pixels[3 * i + c] = stored.pixels[static_cast<size_t>(stored.channels) * i + c];
+  return rgb;
+}
+
+namespace {
+
+json coverage_metrics(const Workbench& bench, const Progress& progress, std::vector<std::string>& warnings) {
+  const float seen = views::seen_share(*bench.scene, bench.cameras);
+  if (seen < 0.85f) {
+    warnings.push_back(
+        fmt::format("The views see {:.0f} % of the surface; what no view sees stays as it was. "
+                    "More views or several elevations (--views 16, --elevation -20 20 50) see more.",
+                    100 * seen));
+    progress.warn(warnings.back());
+  }
+  return {{"coverage", seen}, {"coverage_twice", views::seen_share(*bench.scene, bench.cameras, 2)}};
+}
+
+}  // namespace
+
+RenderedViews render_stage(const Workbench& bench, const Config& config, RunFolder& run,
+                           const Progress& progress) {
+  const std::string key = hash_text(values_read_by(config, kRenderStage).dump() + bench.scene_hash +
+                                    cameras_to_json(bench.cameras).dump() + PATINA_VERSION);
+  run.run_stage("render", key, progress, [&] {
+    const views::ViewOptions options{.path = {.samples_per_pixel = config.samples_per_pixel,
+                                              .max_depth = config.max_depth,
+                                              .seed = config.seed},
+                                     .exposure_ev = config.exposure_ev};
+    const views::ViewSet set = views::render_views(*bench.scene, bench.cameras, options, progress);
+
+    RunFolder::StageResult result;
+    const auto write = [&](const std::string& name, const Image& image) {
+      write_image(run.file(name), image);
+      result.outputs.push_back(name);
+    };
+    for (size_t v = 0; v < set.views.size(); ++v) {
+      write(numbered("views/tile", v, ".png"), views::tile_control(set.views[v], set.exposure_ev));
+      write(numbered("views/normal", v, ".png"), views::normal_control(set.views[v]));
+      write(numbered("views/radiance", v, ".exr"), set.views[v].radiance);
+    }
+    json cameras = cameras_to_json(bench.cameras);
+    cameras["exposure_ev"] = set.exposure_ev;
+    write_json(run.file("views/cameras.json"), cameras);
+    result.outputs.push_back("views/cameras.json");
+    result.metrics = coverage_metrics(bench, progress, result.warnings);
+    result.metrics["exposure_ev"] = set.exposure_ev;
+    return result;
+  });
+  return load_views(bench, run);
+}
+
+RenderedViews load_views(const Workbench& bench, const RunFolder& run) {
+  if (!run.stage("render"))
+    throw Error(ErrorCode::kNotFound, run.path().string(),
+                "has no rendered views yet; run `patina render` on it first");
+  RenderedViews views;
+  const json cameras = read_json(run.file("views/cameras.json"));
+  views.set.grid = static_cast<int>(std::lround(std::sqrt(static_cast<double>(bench.cameras.size()))));
+  views.set.exposure_ev = cameras.value("exposure_ev", 0.0f);
+  for (size_t v = 0; v < bench.cameras.size(); ++v) {
+    const render::Camera& camera = bench.cameras[v];
+    views.tile.push_back(
+        read_rgb_sized(run.file(numbered("views/tile", v, ".png")), camera.width, camera.height));
+    views.normal.push_back(
+        read_rgb_sized(run.file(numbered("views/normal", v, ".png")), camera.width, camera.height));
+    views.set.views.push_back({.camera = camera,
+                               .gbuffer = views::make_gbuffer(*bench.scene, camera),
+                               .radiance = {},
+                               .coverage = {}});
+  }
+  return views;
+}
+
+}  // namespace patina::pipeline

@@ -1,0 +1,173 @@
+// The last stage: renders the result with the path tracer, measures it, and shows it.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "patina/base/files.h"
+#include "patina/correspond/consistency.h"
+#include "patina/image/color.h"
+#include "patina/image/image_io.h"
+#include "patina/pipeline/options.h"
+#include "patina/pipeline/stages.h"
+#include "patina/report/report.h"
+
+namespace patina::pipeline {
+
+using nlohmann::json;
+
+namespace {
+
+// Mean over the views of a measure between two pictures under the loss's weights, so that untrusted
+// silhouettes do not count.
+template <class Measure>
+float mean_over_views(std::span<const Image> a, std::span<const Image> b, std::span<const Image> weights,
+                      Measure measure) {
+  double sum = 0;
+  for (size_t v = 0; v < a.size(); ++v) sum += measure(a[v], b[v], weights[v]);
+  return static_cast<float>(sum / static_cast<double>(a.size()));
+}
+
+json json_number(float value) {
+  return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+std::vector<Image> read_numbered(const RunFolder& run, std::string_view prefix,
+                                 const std::vector<render::Camera>& cameras) {
+  std::vector<Image> images;
+  for (size_t v = 0; v < cameras.size(); ++v)
+    images.push_back(
+        read_rgb_sized(run.file(numbered(prefix, v, ".png")), cameras[v].width, cameras[v].height));
+  return images;
+}
+
+std::string report_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
+                       const FittedMaterials& fitted, const Config& config) {
+  std::string key = values_read_by(config, kReportStage | kDetailStage).dump() + bench.scene_hash +
+                    PATINA_VERSION + cameras_to_json(bench.cameras).dump() +
+                    fmt::format("{}", views.set.exposure_ev);
+  const auto add = [&](const Image& image) {
+    key += hash_bytes(
+        {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
+  };
+  for (const Image& image : views.tile) add(image);
+  for (const Image& image : edited) add(image);
+  for (const asset::MaterialMaps& m : fitted.maps)
+    for (const asset::Map* map : {&m.base_color, &m.roughness, &m.metallic, &m.normal}) add(map->texels);
+  return hash_text(key);
+}
+
+std::vector<report::TexturePair> texture_pairs(const Workbench& bench, const FittedMaterials& fitted) {
+  std::vector<report::TexturePair> pairs;
+  const auto encode_normal = [](Image image) {
+    for (float& value : image.pixels) value = 0.5f + 0.5f * value;
+    return image;
+  };
+  for (size_t m = 0; m < fitted.maps.size(); ++m) {
+    const asset::MaterialMaps &before = bench.maps[m], &after = fitted.maps[m];
+    const asset::ChangedMaps& changed = fitted.changed[m];
+    if (changed.base_color)
+      pairs.push_back({before.name, "base colour", srgb_from_linear(before.base_color.texels),
+                       srgb_from_linear(after.base_color.texels)});
+    if (changed.normal)
+      pairs.push_back(
+          {before.name, "normal", encode_normal(before.normal.texels), encode_normal(after.normal.texels)});
+    if (changed.roughness)
+      pairs.push_back({before.name, "roughness", before.roughness.texels, after.roughness.texels});
+    if (changed.metallic)
+      pairs.push_back({before.name, "metallic", before.metallic.texels, after.metallic.texels});
+  }
+  return pairs;
+}
+
+// metrics.json: the measures of all stages in one place.
+json gather_metrics(const RunFolder& run, const json& measured) {
+  json metrics = measured;
+  if (const StageRecord* render = run.stage("render"))
+    for (const auto& [name, value] : render->metrics.items()) metrics[name] = value;
+  if (const StageRecord* detail = run.stage("detail")) {
+    metrics["noise"] = detail->metrics.value("noise", json::object());
+    metrics["model"] = detail->metrics.value("model", json());
+  }
+  if (const StageRecord* fit = run.stage("fit"))
+    metrics["fit"]["training_psnr"] = fit->metrics.value("training_psnr", json());
+  metrics["stages"] = json::array();
+  for (const StageRecord& stage : run.stages())
+    metrics["stages"].push_back(
+        {{"name", stage.name}, {"seconds", stage.seconds}, {"peak_rss_mb", stage.peak_rss_mb}});
+  return metrics;
+}
+
+}  // namespace
+
+void report_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
+                  const FittedMaterials& fitted, const Config& config, RunFolder& run,
+                  const Progress& progress) {
+  const StageRecord& record =
+      run.run_stage("report", report_key(bench, views, edited, fitted, config), progress, [&] {
+        RunFolder::StageResult result;
+        const render::Scene after(bench.asset, fitted.maps, bench.scene->environment(), bench.context.get(),
+                                  {.bsdf_model = config.bsdf});
+        const views::ViewOptions options{.path = {.samples_per_pixel = config.samples_per_pixel,
+                                                  .max_depth = config.max_depth,
+                                                  .seed = config.seed},
+                                         .exposure_ev = views.set.exposure_ev};
+        const views::ViewSet rendered = views::render_views(after, bench.cameras, options, progress);
+        std::vector<Image> pictures, weights;
+        for (size_t v = 0; v < rendered.views.size(); ++v) {
+          pictures.push_back(views::tile_control(rendered.views[v], views.set.exposure_ev));
+          weights.push_back(
+              inverse::loss_weight(views.set.views[v].gbuffer, bench.enhanced, config.fit.boundary_pixels));
+          result.outputs.push_back(numbered("report/rendered", v, ".png"));
+          write_image(run.file(result.outputs.back()), pictures.back());
+        }
+        const correspond::Consistency consistency =
+            correspond::edit_consistency(*bench.scene, views.set, views.tile, edited);
+        result.metrics["consistency"] = {{"edit_correlation", json_number(consistency.edit_correlation)},
+                                         {"edit_psnr", json_number(consistency.edit_psnr)},
+                                         {"covisible_pixels", consistency.covisible_pixels}};
+        result.metrics["fit"] = {
+            {"psnr", json_number(mean_over_views(pictures, edited, weights, report::psnr))},
+            {"sharpness", json_number(mean_over_views(pictures, edited, weights, report::sharpness_kept))},
+            {"psnr_before", json_number(mean_over_views(views.tile, edited, weights, report::psnr))}};
+        if (config.turntable_frames > 0) {
+          views::OrbitOptions orbit = config.orbit;
+          orbit.num_views = config.turntable_frames;
+          orbit.elevations.resize(1);  // a turntable turns level
+          orbit.resolution = std::min(config.orbit.resolution, 320);
+          const auto cameras = views::orbit_cameras(asset::bounds(bench.asset), orbit);
+          report::write_turntable(run.file("turntable.webp"), *bench.scene, after, cameras,
+                                  {.frames = config.turntable_frames,
+                                   .resolution = orbit.resolution,
+                                   .samples_per_pixel = std::min(config.samples_per_pixel, 24),
+                                   .exposure_ev = views.set.exposure_ev},
+                                  progress);
+          result.outputs.push_back("turntable.webp");
+        }
+        return result;
+      });
+
+  // The page is made anew every time: it is cheap, and tells of stages that ran again.
+  report::ReportData page;
+  page.title = bench.asset.path.filename().string();
+  page.prompt = config.detail.prompt;
+  page.negative_prompt = config.detail.negative_prompt;
+  page.before = views.tile;
+  page.edited.assign(edited.begin(), edited.end());
+  page.after = read_numbered(run, "report/rendered", bench.cameras);
+  page.textures = texture_pairs(bench, fitted);
+  if (const StageRecord* fit = run.stage("fit"))
+    for (const json& loss : fit->metrics.value("loss", json::array()))
+      page.loss.push_back(loss.is_number() ? loss.get<float>() : NAN);
+  page.config = to_json(config);
+  page.config["asset"] = config.asset.string();
+  page.config["version"] = PATINA_VERSION;
+  page.metrics = gather_metrics(run, record.metrics);
+  page.warnings = bench.warnings;
+  for (const StageRecord& stage : run.stages())
+    page.warnings.insert(page.warnings.end(), stage.warnings.begin(), stage.warnings.end());
+  if (config.turntable_frames > 0) page.turntable = run.file("turntable.webp");
+  write_json(run.file("metrics.json"), page.metrics);
+  report::write_report(run.file("report.html"), page);
+}
+
+}  // namespace patina::pipeline

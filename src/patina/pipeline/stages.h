@@ -1,0 +1,58 @@
+// The stages of a run. Each reads plain structs and the run folder, writes its part of the run folder and
+// returns it; each is skipped when nothing it reads has changed. What a stage returns was read back from
+// disk, so a resumed run sees the very same values, and pictures that an artist edited in between are taken
+// as they are.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "patina/pipeline/config.h"
+#include "patina/pipeline/run_folder.h"
+#include "patina/pipeline/workbench.h"
+
+namespace patina::pipeline {
+
+/// The rendered views as the later stages need them: G-buffers and exposure in `set` (without radiance),
+/// control images beside.
+struct RenderedViews {
+  views::ViewSet set;
+  std::vector<Image> tile;    // [H,W,3] sRGB, one a view
+  std::vector<Image> normal;  // [H,W,3] in the protocol of ControlNet normalbae
+};
+
+/// Renders the views → views/tile_NN.png, views/normal_NN.png, views/radiance_NN.exr, views/cameras.json.
+RenderedViews render_stage(const Workbench& bench, const Config& config, RunFolder& run,
+                           const Progress& progress);
+
+/// Lets the diffusion model edit the views → detail/edited_NN.png.
+std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& views, const Config& config,
+                                RunFolder& run, const Progress& progress);
+
+/// Carries the edit into the textures → textures/NN_<material>_<slot>.png, textures/loss.json.
+struct FittedMaterials {
+  std::vector<asset::MaterialMaps> maps;  // one a material of the asset
+  std::vector<asset::ChangedMaps> changed;
+};
+FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
+                          const Config& config, RunFolder& run, const Progress& progress);
+
+/// Measures the result and shows it → metrics.json, report.html, turntable.webp, report/rendered_NN.png.
+void report_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
+                  const FittedMaterials& fitted, const Config& config, RunFolder& run,
+                  const Progress& progress);
+
+/// What lies in the run folder from earlier, without running anything. Throw Error{kNotFound} that says which
+/// command makes it.
+RenderedViews load_views(const Workbench& bench, const RunFolder& run);
+std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run);
+FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run);
+
+/// A picture of a run folder as [height,width,3]; an alpha channel that a paint program added is dropped.
+/// Throws Error{kFormat} on another size.
+Image read_rgb_sized(const std::filesystem::path& path, int width, int height);
+
+/// Path of file number `index` of a stage: "views/tile_03.png".
+std::string numbered(std::string_view prefix, size_t index, std::string_view extension);
+
+}  // namespace patina::pipeline

@@ -1,0 +1,44 @@
+// What every stage works on: the asset, its materials, the scene it stands in, and the cameras. Rebuilt from
+// the inputs by every command, since that takes a moment; only what takes long is kept in the run folder.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "patina/asset/asset.h"
+#include "patina/asset/material_maps.h"
+#include "patina/base/progress.h"
+#include "patina/pipeline/config.h"
+#include "patina/render/scene.h"
+
+namespace patina::pipeline {
+
+struct Workbench {
+  asset::Asset asset;
+  std::unique_ptr<asset::Asset> context;  // null: none
+  std::vector<asset::MaterialMaps> maps;  // the asset's own, one a material
+  std::vector<bool> enhanced;             // one a material: may it change
+  std::unique_ptr<render::Scene> scene;   // with `maps`
+  std::vector<render::Camera> cameras;
+  std::vector<std::string> warnings;  // what will not come out well, for the report
+  std::string scene_hash;  // of geometry, materials, lights, environment: all that renders depend on
+};
+
+/// Reads asset, context, environment and cameras and builds the scene. Throws Error for files that cannot be
+/// used, for an asset without usable UVs, and for material names that it does not have (listing those it
+/// has). Warns of what will not come out well.
+Workbench open_workbench(const Config& config, const Progress& progress);
+
+/// Cameras as JSON: {"cameras": [{"world_from_camera": 16 numbers column by column, "fov_degrees", "width",
+/// "height"}], ...}.
+nlohmann::json cameras_to_json(std::span<const render::Camera> cameras);
+/// Throws Error{kFormat} naming the file and what is wrong: the number must be square, sizes equal and
+/// multiples of 8.
+std::vector<render::Camera> cameras_from_json(const nlohmann::json& json, const std::string& context);
+
+}  // namespace patina::pipeline
