@@ -1,1 +1,315 @@
 #include "patina/inverse/fit.h"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+
+#include "patina/base/check.h"
+#include "patina/base/error.h"
+#include "patina/base/parallel.h"
+#include "patina/image/color.h"
+#include "patina/inverse/evaluate.h"
+#include "patina/inverse/fit_state.h"
+#include "patina/inverse/loss.h"
+
+namespace patina::inverse {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The light cache is traced this often in a fit, each time with new points and directions, so that no fixed
+// noise is fitted.
+constexpr int kGenerations = 8;
+// Loss per texel and squared change, in units of one fully weighted pixel's loss: holds what the views leave
+// undecided.
+constexpr float kPull = 1e-3f;
+// The first quarter of the iterations moves levels from a quarter of the finest size down, the second from a
+// half, the rest all.
+constexpr int kCoarseLevels = 2;
+constexpr double kSecondsBetweenCheckpoints = 20;
+
+// Sizes a map without texture gets from what the views resolve.
+constexpr int kMinFactorSize = 16, kMaxFactorSize = 2048;
+
+bool is_chosen(const FitOptions& options, Slot slot) {
+  switch (slot) {
+    case Slot::kBaseColor:
+      return options.fit_base_color;
+    case Slot::kRoughness:
+      return options.fit_roughness;
+    case Slot::kMetallic:
+      return options.fit_metallic;
+    case Slot::kNormal:
+      break;
+  }
+  return options.fit_normal;
+}
+bool is_chosen(const FitOptions& options, int material) {
+  return options.materials.empty() || options.materials[static_cast<size_t>(material)];
+}
+
+void check_inputs(const render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
+                  const FitOptions& options) {
+  if (edited.size() != views.views.size())
+    throw Error(ErrorCode::kUsage, "fit",
+                "expected one edited image for each of " + std::to_string(views.views.size()) +
+                    " views, found " + std::to_string(edited.size()));
+  for (size_t v = 0; v < edited.size(); ++v) {
+    const auto& g = views.views[v].gbuffer;
+    if (edited[v].width != g.width || edited[v].height != g.height || edited[v].channels != 3)
+      throw Error(ErrorCode::kUsage, "edited view " + std::to_string(v),
+                  "expected " + std::to_string(g.width) + " x " + std::to_string(g.height) +
+                      " pixels of 3 channels, found " + std::to_string(edited[v].width) + " x " +
+                      std::to_string(edited[v].height) + " of " + std::to_string(edited[v].channels));
+  }
+  PATINA_CHECK(options.materials.empty() ||
+               static_cast<int>(options.materials.size()) == scene.num_asset_materials());
+  PATINA_CHECK_LE(0, options.iterations);
+}
+
+// The asset's maps at the size that they will be written with: texture_size where given; slots without a
+// texture get one that the views resolve.
+std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const views::ViewSet& views,
+                                               std::span<const CachePixel> pixels,
+                                               const FitOptions& options) {
+  std::vector<asset::MaterialMaps> maps(scene.materials().begin(),
+                                        scene.materials().begin() + scene.num_asset_materials());
+  for (int m = 0; m < scene.num_asset_materials(); ++m) {
+    if (!is_chosen(options, m)) continue;
+    for (const Slot slot : kSlots) {
+      if (!is_chosen(options, slot)) continue;
+      asset::Map& map = slot_map(maps[static_cast<size_t>(m)], slot);
+      int width = map.texels.width, height = map.texels.height;
+      if (options.texture_size > 0) {
+        width = height = options.texture_size;
+      } else if (map.texels.num_pixels() == 1) {
+        const float across = texels_per_pixel(scene, views, pixels, map, m);
+        const float resolved = across > 0.0f ? 1.0f / across : 1.0f;
+        width = height = static_cast<int>(std::bit_ceil(static_cast<unsigned>(
+            std::clamp(resolved, static_cast<float>(kMinFactorSize), static_cast<float>(kMaxFactorSize)))));
+      }
+      map = asset::resized(map, width, height);
+      if (slot == Slot::kNormal)
+        for (size_t i = 0; i < map.texels.num_pixels(); ++i) {
+          float* texel = map.texels.pixels.data() + 3 * i;
+          const vec3 n = glm::normalize(vec3(texel[0], texel[1], texel[2]));
+          texel[0] = n.x, texel[1] = n.y, texel[2] = n.z;
+        }
+    }
+  }
+  return maps;
+}
+
+// Which texels of a field may change: seen ones with a rim of one texel for bilinear look-ups, and those of
+// no surface.
+Image changeable(const Image& evidence, const Image& covered) {
+  Image out(evidence.width, evidence.height, 1);
+  for (int y = 0; y < out.height; ++y)
+    for (int x = 0; x < out.width; ++x) {
+      bool allowed = *covered.at(x, y) <= 0.0f;
+      for (int dy = -1; dy <= 1 && !allowed; ++dy)
+        for (int dx = -1; dx <= 1 && !allowed; ++dx) {
+          const int nx = std::clamp(x + dx, 0, out.width - 1), ny = std::clamp(y + dy, 0, out.height - 1);
+          allowed = *evidence.at(nx, ny) > 0.0f;
+        }
+      *out.at(x, y) = allowed ? 1.0f : 0.0f;
+    }
+  return out;
+}
+
+std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views::ViewSet& views,
+                                        std::span<const CachePixel> pixels, const FitOptions& options) {
+  const std::vector<SeenPoint> seen = trace_seen_points(scene, views, pixels);
+  std::vector<FittedMap> fitted;
+  for (int m = 0; m < scene.num_asset_materials(); ++m) {
+    if (!is_chosen(options, m)) continue;
+    for (const Slot slot : kSlots) {
+      if (!is_chosen(options, slot)) continue;
+      const asset::Map& map = slot_map(scene.materials()[static_cast<size_t>(m)], slot);
+      const float across = texels_per_pixel(scene, views, pixels, map, m);
+      if (!(across > 0.0f)) continue;  // not seen, or without UVs
+      // The finest level has between one and two texels a pixel, or the map's own if that is coarser.
+      const int drop = std::max(0, static_cast<int>(std::floor(std::log2(across))));
+      const int width = std::max(1, map.texels.width >> drop),
+                height = std::max(1, map.texels.height >> drop);
+      FittedMap entry;
+      entry.material = m;
+      entry.slot = slot;
+      entry.field = make_field(map, width, height, slot == Slot::kNormal ? 2 : num_channels(slot));
+      entry.evidence = evidence_of(map, width, height, slot, m, seen);
+      entry.may_change = changeable(entry.evidence, uv_coverage(scene, map, width, height, m));
+      fitted.push_back(std::move(entry));
+    }
+  }
+  return fitted;
+}
+
+int finest_level(const FitState& state, const FittedMap& map, int iterations) {
+  const int stage = 4 * state.next_iteration / std::max(1, iterations);
+  return std::min(std::max(0, kCoarseLevels - stage), static_cast<int>(map.field.levels.size()) - 1);
+}
+
+// Full speed for the first half, then a cosine down to a twentieth: the last iterations average the noise
+// out.
+float learning_rate(const FitOptions& options, int iteration) {
+  const float t = static_cast<float>(iteration) / static_cast<float>(std::max(1, options.iterations));
+  const float fall = 0.5f + 0.5f * std::cos(kPi * std::clamp(2.0f * t - 1.0f, 0.0f, 1.0f));
+  return options.learning_rate * (0.05f + 0.95f * fall);
+}
+
+void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
+  parallel_for(0, static_cast<int64_t>(state.fitted.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
+      FittedMap& map = state.fitted[f];
+      Image& gradient = evaluation.d_delta[f];
+      for (size_t i = 0; i < gradient.pixels.size(); ++i)
+        gradient.pixels[i] += kPull * map.field.delta.texels.pixels[i];
+      AdamOptions adam;
+      adam.learning_rate = learning_rate(options, state.next_iteration);
+      adam_step(map.field, restrict_to_levels(map.field, gradient),
+                finest_level(state, map, options.iterations), adam);
+    }
+  });
+}
+
+float psnr_of(const LightCache& cache, std::span<const FittedMap> fitted, const render::Scene& scene,
+              std::span<const Image> edited, float gain) {
+  const std::vector<vec3> radiance = shade_pixels(cache, fitted, scene.bsdf_model());
+  double error = 0;
+  for (size_t i = 0; i < radiance.size(); ++i) {
+    const CachePixel& pixel = cache.pixels[i];
+    for (int c = 0; c < 3; ++c) {
+      const double difference =
+          srgb_from_linear(reinhard(gain * radiance[i][c])) - edited[pixel.view].at(pixel.x, pixel.y)[c];
+      error += difference * difference;
+    }
+  }
+  const double mean = error / std::max<double>(1.0, 3.0 * static_cast<double>(radiance.size()));
+  return static_cast<float>(mean > 0 ? -10.0 * std::log10(mean) : 100.0);
+}
+
+}  // namespace
+
+FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
+                        const FitOptions& options, const FitHooks& hooks, const Progress& progress) {
+  check_inputs(scene, views, edited, options);
+  const float gain = std::exp2(views.exposure_ev);
+  const render::BsdfModel model = scene.bsdf_model();
+  const int num_materials = scene.num_asset_materials();
+
+  // Which pixels count, and toward what.
+  std::vector<bool> chosen(static_cast<size_t>(num_materials));
+  for (int m = 0; m < num_materials; ++m) chosen[static_cast<size_t>(m)] = is_chosen(options, m);
+  std::vector<Image> targets, weights;
+  for (size_t v = 0; v < edited.size(); ++v) {
+    targets.push_back(loss_target(edited[v]));
+    weights.push_back(loss_weight(views.views[v].gbuffer, chosen, options.boundary_pixels));
+  }
+  const std::vector<CachePixel> pixels = select_pixels(views, targets, weights);
+
+  // The unknowns.
+  const std::vector<asset::MaterialMaps> base = enlarged_maps(scene, views, pixels, options);
+  scene.set_asset_materials(base);
+  FitState state;
+  state.fitted = make_fitted_maps(scene, views, pixels, options);
+  state.cache_parameters = state.best_parameters = parameters_of(state.fitted);
+  if (state.fitted.empty())
+    progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
+  if (hooks.resume) restore_checkpoint(state, *hooks.resume);
+
+  const auto trace_cache = [&](uint32_t generation) {
+    scene.set_asset_materials(apply_changes(base, state.fitted));
+    CacheOptions cache_options;
+    cache_options.light_samples = options.light_samples;
+    cache_options.max_depth = options.max_depth;
+    cache_options.seed = options.seed;
+    cache_options.generation = generation;
+    return build_cache(scene, views, pixels, base, cache_options, progress);
+  };
+  const auto keep_if_best = [&](float loss) {
+    if (loss >= state.best_loss) return;
+    state.best_loss = loss;
+    state.best_parameters = parameters_of(state.fitted);
+  };
+
+  const int generation_length = std::max(1, (options.iterations + kGenerations - 1) / kGenerations);
+  LightCache cache;
+  if (state.next_iteration % generation_length != 0 && state.next_iteration < options.iterations) {
+    // Resumed within a generation: its cache was traced with the parameters of its beginning.
+    const Parameters current = parameters_of(state.fitted);
+    set_parameters(state.fitted, state.cache_parameters);
+    cache = trace_cache(static_cast<uint32_t>(state.next_iteration / generation_length));
+    set_parameters(state.fitted, current);
+  }
+
+  auto last_checkpoint = Clock::now();
+  while (!state.fitted.empty() && state.next_iteration < options.iterations) {
+    progress.throw_if_stopped();
+    const bool new_generation = state.next_iteration % generation_length == 0;
+    if (new_generation) {
+      cache = {};  // two would not fit where one does
+      state.cache_parameters = parameters_of(state.fitted);
+      cache = trace_cache(static_cast<uint32_t>(state.next_iteration / generation_length));
+    }
+    Evaluation evaluation = evaluate(cache, state.fitted, model, gain);
+    // Only a fresh cache judges the parameters without the noise that they were fitted to.
+    if (new_generation) keep_if_best(evaluation.loss);
+    step(state, evaluation, options);
+    state.loss.push_back(evaluation.loss);
+    ++state.next_iteration;
+    progress.update("fit", state.next_iteration, options.iterations);
+
+    const std::chrono::duration<double> since = Clock::now() - last_checkpoint;
+    if (hooks.on_checkpoint &&
+        (since.count() > kSecondsBetweenCheckpoints || state.next_iteration == options.iterations)) {
+      hooks.on_checkpoint(make_checkpoint(state));
+      last_checkpoint = Clock::now();
+    }
+  }
+
+  // A cache that no iteration saw judges the end, and the result.
+  FitResult result;
+  if (!state.fitted.empty()) {
+    cache = {};
+    cache = trace_cache(kGenerations);
+    keep_if_best(evaluate(cache, state.fitted, model, gain).loss);
+    set_parameters(state.fitted, state.best_parameters);
+    result.psnr = psnr_of(cache, state.fitted, scene, edited, gain);
+  }
+  result.loss = std::move(state.loss);
+  result.maps = apply_changes(base, state.fitted);
+  scene.set_asset_materials(result.maps);
+  result.changed.resize(static_cast<size_t>(num_materials));
+  result.evidence.resize(static_cast<size_t>(num_materials));
+  for (int m = 0; m < num_materials; ++m) {
+    const Image& texels = result.maps[static_cast<size_t>(m)].base_color.texels;
+    result.evidence[static_cast<size_t>(m)] = Image(texels.width, texels.height, 1);
+  }
+  for (const FittedMap& map : state.fitted) {
+    const auto m = static_cast<size_t>(map.material);
+    asset::ChangedMaps& changed = result.changed[m];
+    switch (map.slot) {
+      case Slot::kBaseColor: {
+        changed.base_color = true;
+        asset::Map evidence = map.field.delta;
+        evidence.texels = map.evidence;
+        result.evidence[m] =
+            asset::resized(evidence, result.evidence[m].width, result.evidence[m].height).texels;
+        break;
+      }
+      case Slot::kRoughness:
+        changed.roughness = true;
+        break;
+      case Slot::kMetallic:
+        changed.metallic = true;
+        break;
+      case Slot::kNormal:
+        changed.normal = true;
+        break;
+    }
+  }
+  return result;
+}
+
+}  // namespace patina::inverse

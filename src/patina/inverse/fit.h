@@ -1,4 +1,5 @@
-// Inverse rendering: finds base colour, roughness and normal maps whose renders look like the edited views [Hadadan2025, Sec. 4 and 5].
+// Inverse rendering: finds base colour, roughness and normal maps whose renders look like the edited views
+// [Hadadan2025, Sec. 4 and 5].
 #pragma once
 
 #include <functional>
@@ -15,13 +16,14 @@ namespace patina::inverse {
 
 struct FitOptions {
   int iterations = 200;
-  int texture_size = 0;               // texels a side of fitted maps; 0: the asset's own size, or what the views resolve for factor-only slots
+  int texture_size = 0;  // texels a side of fitted maps; 0: the asset's own size, or what the views resolve
+                         // for factor-only slots
   bool fit_base_color = true, fit_roughness = true, fit_normal = true, fit_metallic = false;
-  std::vector<bool> materials;        // which materials may change; empty: all of the asset
-  float learning_rate = 0.02f;        // Adam, a texel value in [0,1]
-  int light_samples = 32;             // incident directions kept a pixel
-  int max_depth = 4;                  // of the paths that gather incident light
-  int boundary_pixels = 3;            // pixels beside silhouettes and depth edges that count nothing
+  std::vector<bool> materials;  // which materials may change; empty: all of the asset
+  float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
+  int light_samples = 32;       // incident directions kept a pixel
+  int max_depth = 4;            // of the paths that gather incident light
+  int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
   uint64_t seed = 0;
 };
 
@@ -31,24 +33,26 @@ struct FitCheckpoint {
   std::vector<uint8_t> bytes;
 };
 struct FitHooks {
-  std::function<void(const FitCheckpoint&)> on_checkpoint;   // now and then (at least every 30 s) and at the end
+  std::function<void(const FitCheckpoint&)>
+      on_checkpoint;  // now and then (at least every 30 s) and at the end
   std::optional<FitCheckpoint> resume;
 };
 
 struct FitResult {
-  std::vector<asset::MaterialMaps> maps;        // one entry a material of the asset
+  std::vector<asset::MaterialMaps> maps;  // one entry a material of the asset
   std::vector<asset::ChangedMaps> changed;
-  std::vector<float> loss;                      // per iteration
-  float psnr = 0;                               // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
-  std::vector<Image> evidence;                  // per material [h,w,1]: weight with which views saw each base-colour texel
+  std::vector<float> loss;      // per iteration
+  float psnr = 0;               // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
+  std::vector<Image> evidence;  // per material [h,w,1]: weight with which views saw each base-colour texel
 };
 
-/// `edited`: one sRGB [H,W,3] image in [0,1] a view; `scene` holds the starting materials and is left with the fitted ones.
+/// `edited`: one sRGB [H,W,3] image in [0,1] a view; `scene` holds the starting materials and is left with
+/// the fitted ones.
 FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
                         const FitOptions& options, const FitHooks& hooks, const Progress& progress);
 
-/// Weight of every pixel in the loss, [H,W,1] in [0,1]: zero off the enhanced materials, within `boundary_pixels` of the object's
-/// boundary and of depth edges; times the view cosine at grazing angles.
+/// Weight of every pixel in the loss, [H,W,1] in [0,1]: zero off the enhanced materials, within
+/// `boundary_pixels` of the object's boundary and of depth edges; times the view cosine at grazing angles.
 Image loss_weight(const views::GBuffer& gbuffer, const std::vector<bool>& materials, int boundary_pixels);
 
 }  // namespace patina::inverse

@@ -1,0 +1,172 @@
+#include "patina/inverse/evaluate.h"
+
+#include <algorithm>
+#include <array>
+
+#include "patina/base/parallel.h"
+#include "patina/inverse/loss.h"
+#include "patina/inverse/shade.h"
+
+namespace patina::inverse {
+namespace {
+
+constexpr int64_t kPixelsPerTask = 256;
+
+// Fitted maps by material and slot.
+using FieldTable = std::vector<std::array<const FittedMap*, kNumSlots>>;
+FieldTable table_of(std::span<const FittedMap> fitted) {
+  FieldTable table;
+  for (const FittedMap& map : fitted) {
+    const auto m = static_cast<size_t>(map.material);
+    if (table.size() <= m) table.resize(m + 1);
+    table[m][static_cast<size_t>(map.slot)] = &map;
+  }
+  return table;
+}
+
+// Adds the field's value to `value` within the slot's range. Returns a bit per channel that a bound holds
+// back, low bounds in bits 0 to 2, high bounds in bits 3 to 5.
+uint8_t add_change(const FittedMap* map, const vec2& uv, float* value) {
+  if (!map) return 0;
+  const asset::Map& delta = map->field.delta;
+  const asset::BilinearTap tap = asset::bilinear_tap(delta, uv);
+  const auto channels = static_cast<size_t>(delta.texels.channels);
+  const Range range = slot_range(map->slot);
+  uint8_t held = 0;
+  for (size_t c = 0; c < channels; ++c) {
+    float change = 0;
+    for (size_t t = 0; t < 4; ++t)
+      change += tap.weight[t] * delta.texels.pixels[static_cast<size_t>(tap.texel[t]) * channels + c];
+    const float moved = value[c] + change;
+    value[c] = std::clamp(moved, range.low, range.high);
+    if (moved < range.low) held |= static_cast<uint8_t>(1u << c);
+    if (moved > range.high) held |= static_cast<uint8_t>(8u << c);
+  }
+  return held;
+}
+
+struct CurrentValues {
+  MapValues values;
+  std::array<uint8_t, kNumSlots> held{};
+};
+CurrentValues current_values(const FieldTable& table, const CacheSample& sample) {
+  CurrentValues current{sample.base, {}};
+  if (sample.point.material >= table.size()) return current;
+  const auto& maps = table[sample.point.material];
+  const auto add = [&](Slot slot, float* value) {
+    const auto s = static_cast<size_t>(slot);
+    current.held[s] = add_change(maps[s], sample.point.uv[s], value);
+  };
+  add(Slot::kBaseColor, &current.values.base_color.x);
+  add(Slot::kRoughness, &current.values.roughness);
+  add(Slot::kMetallic, &current.values.metallic);
+  add(Slot::kNormal, &current.values.normal.x);
+  return current;
+}
+
+// A value at its bound gets no gradient that pushes it further out.
+float inward(float gradient, uint8_t held, int channel) {
+  if ((held & (1u << channel)) && gradient > 0.0f) return 0.0f;
+  if ((held & (8u << channel)) && gradient < 0.0f) return 0.0f;
+  return gradient;
+}
+void keep_inward(MapGradient& gradient, const std::array<uint8_t, kNumSlots>& held) {
+  for (int c = 0; c < 3; ++c)
+    gradient.base_color[c] = inward(gradient.base_color[c], held[static_cast<size_t>(Slot::kBaseColor)], c);
+  gradient.roughness = inward(gradient.roughness, held[static_cast<size_t>(Slot::kRoughness)], 0);
+  gradient.metallic = inward(gradient.metallic, held[static_cast<size_t>(Slot::kMetallic)], 0);
+}
+
+const float* slot_gradient(const MapGradient& gradient, Slot slot) {
+  switch (slot) {
+    case Slot::kBaseColor:
+      return &gradient.base_color.x;
+    case Slot::kRoughness:
+      return &gradient.roughness;
+    case Slot::kMetallic:
+      return &gradient.metallic;
+    case Slot::kNormal:
+      break;
+  }
+  return &gradient.normal.x;
+}
+
+}  // namespace
+
+Evaluation evaluate(const LightCache& cache, std::span<const FittedMap> fitted, render::BsdfModel model,
+                    float gain) {
+  const FieldTable table = table_of(fitted);
+  std::vector<float> pixel_loss(cache.pixels.size());
+  std::vector<MapGradient> gradients(cache.samples.size());
+  parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      std::array<CurrentValues, 2> current;
+      std::array<Shading, 2> shading;
+      std::array<vec3, 2> radiance;
+      for (size_t half = 0; half < 2; ++half) {
+        const CacheSample& sample = cache.samples[2 * i + half];
+        current[half] = current_values(table, sample);
+        shading[half] = shade_values(sample.point, current[half].values);
+        radiance[half] = shade(model, sample, shading[half], cache.lights_of(2 * i + half));
+      }
+      const CachePixel& pixel = cache.pixels[i];
+      const PairLoss loss = relative_l2(radiance[0], radiance[1], pixel.target, gain);
+      pixel_loss[i] = pixel.weight * loss.value;
+      for (size_t half = 0; half < 2; ++half) {
+        const size_t s = 2 * i + half;
+        const vec3 d_radiance = pixel.weight * (half == 0 ? loss.d_radiance_a : loss.d_radiance_b);
+        gradients[s] = shade_adjoint(model, cache.samples[s], shading[half], cache.lights_of(s), d_radiance);
+        keep_inward(gradients[s], current[half].held);
+      }
+    }
+  });
+
+  Evaluation result;
+  double loss = 0, weight = 0;
+  for (size_t i = 0; i < pixel_loss.size(); ++i) loss += pixel_loss[i], weight += cache.pixels[i].weight;
+  result.loss = weight > 0 ? static_cast<float>(loss / weight) : 0.0f;
+
+  // One task a map, each adding its samples in order: no two tasks write to one texel, and no order depends
+  // on a thread.
+  result.d_delta.resize(fitted.size());
+  parallel_for(0, static_cast<int64_t>(fitted.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
+      const FittedMap& map = fitted[f];
+      const asset::Map& delta = map.field.delta;
+      Image sum(delta.texels.width, delta.texels.height, delta.texels.channels);
+      const auto channels = static_cast<size_t>(sum.channels);
+      for (size_t s = 0; s < gradients.size(); ++s) {
+        const CacheSample& sample = cache.samples[s];
+        if (!sample.hit || sample.point.material != map.material) continue;
+        const asset::BilinearTap tap =
+            asset::bilinear_tap(delta, sample.point.uv[static_cast<size_t>(map.slot)]);
+        const float* gradient = slot_gradient(gradients[s], map.slot);
+        for (size_t t = 0; t < 4; ++t)
+          for (size_t c = 0; c < channels; ++c)
+            sum.pixels[static_cast<size_t>(tap.texel[t]) * channels + c] += tap.weight[t] * gradient[c];
+      }
+      result.d_delta[f] = std::move(sum);
+    }
+  });
+  return result;
+}
+
+std::vector<vec3> shade_pixels(const LightCache& cache, std::span<const FittedMap> fitted,
+                               render::BsdfModel model) {
+  const FieldTable table = table_of(fitted);
+  std::vector<vec3> radiance(cache.pixels.size());
+  parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      vec3 sum(0.0f);
+      for (size_t s = 2 * i; s < 2 * i + 2; ++s) {
+        const CacheSample& sample = cache.samples[s];
+        sum += shade(model, sample, shade_values(sample.point, current_values(table, sample).values),
+                     cache.lights_of(s));
+      }
+      radiance[i] = 0.5f * sum;
+    }
+  });
+  return radiance;
+}
+
+}  // namespace patina::inverse

@@ -1,0 +1,37 @@
+// What the views tell about a texture: how finely they resolve it, which texels they see, and which texels
+// any surface uses.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "patina/inverse/light_cache.h"
+#include "patina/inverse/material_point.h"
+
+namespace patina::inverse {
+
+/// Texels of `map` across one pixel, the quarter of the material's pixels that see it closest left below: 3
+/// means that a texture of a third of the size loses hardly anything that the views show. 0 where no pixel
+/// shows the material or it has no UVs.
+float texels_per_pixel(const render::Scene& scene, const views::ViewSet& views,
+                       std::span<const CachePixel> pixels, const asset::Map& map, int material);
+
+/// Points at which camera rays through a 2 × 2 pattern in each pixel meet a material, with the pixel's
+/// weight.
+struct SeenPoint {
+  MaterialPoint point;
+  float weight;
+};
+std::vector<SeenPoint> trace_seen_points(const render::Scene& scene, const views::ViewSet& views,
+                                         std::span<const CachePixel> pixels);
+
+/// Sum of weights with which the views see every texel of a width × height texture laid out as `map`.
+/// [height,width,1]
+Image evidence_of(const asset::Map& map, int width, int height, Slot slot, int material,
+                  std::span<const SeenPoint> points);
+
+/// 1 for texels of a width × height texture laid out as `map` that some triangle of the material touches,
+/// else 0. [height,width,1]
+Image uv_coverage(const render::Scene& scene, const asset::Map& map, int width, int height, int material);
+
+}  // namespace patina::inverse

@@ -1,0 +1,148 @@
+#include "patina/inverse/fit_state.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "patina/base/error.h"
+#include "patina/base/parallel.h"
+
+namespace patina::inverse {
+namespace {
+
+// Padding reaches this far beyond the islands: four mip levels of a trilinear look-up.
+constexpr int kPaddingTexels = 16;
+
+void append(std::vector<uint8_t>& bytes, const void* data, size_t size) {
+  const auto* begin = static_cast<const uint8_t*>(data);
+  bytes.insert(bytes.end(), begin, begin + size);
+}
+void append(std::vector<uint8_t>& bytes, const std::vector<float>& values) {
+  append(bytes, values.data(), values.size() * sizeof(float));
+}
+
+// Reads what append wrote; sizes are known from the state that is filled.
+class Reader {
+ public:
+  explicit Reader(std::span<const uint8_t> bytes) : bytes_(bytes) {}
+  void read(void* data, size_t size) {
+    if (bytes_.size() < size) fail();
+    if (size > 0) std::memcpy(data, bytes_.data(), size);
+    bytes_ = bytes_.subspan(size);
+  }
+  void read(std::vector<float>& values) { read(values.data(), values.size() * sizeof(float)); }
+  void expect_end() const {
+    if (!bytes_.empty()) fail();
+  }
+
+ private:
+  [[noreturn]] static void fail() {
+    throw Error(ErrorCode::kFormat, "fit checkpoint",
+                "belongs to other textures or options than this fit has; delete it to start the fit anew");
+  }
+  std::span<const uint8_t> bytes_;
+};
+
+template <class Archive>
+void each_parameter(Archive&& archive, auto& parameters) {
+  for (auto& levels : parameters)
+    for (auto& level : levels) archive(level.pixels);
+}
+
+}  // namespace
+
+Range slot_range(Slot slot) {
+  switch (slot) {
+    case Slot::kRoughness:
+      return {0.03f, 1.0f};  // below, GGX lobes are narrower than float or views resolve
+    case Slot::kNormal:
+      return {-1e30f, 1e30f};
+    case Slot::kBaseColor:
+    case Slot::kMetallic:
+      break;
+  }
+  return {0.0f, 1.0f};
+}
+
+std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::MaterialMaps>& base,
+                                               std::span<const FittedMap> fitted) {
+  std::vector<asset::MaterialMaps> maps = base;
+  for (const FittedMap& map : fitted) {
+    asset::Map change = map.field.delta;
+    change.texels = dilated(change, map.evidence, kPaddingTexels);
+    for (size_t i = 0; i < map.may_change.pixels.size(); ++i)
+      if (map.may_change.pixels[i] <= 0.0f)
+        std::fill_n(change.texels.pixels.begin() + static_cast<std::ptrdiff_t>(i) * change.texels.channels,
+                    change.texels.channels, 0.0f);
+
+    Image& texels = slot_map(maps[static_cast<size_t>(map.material)], map.slot).texels;
+    change = asset::resized(change, texels.width, texels.height);
+    const Range range = slot_range(map.slot);
+    const int fitted_channels = change.texels.channels;
+    parallel_for(0, static_cast<int64_t>(texels.num_pixels()), 4096, [&](int64_t begin, int64_t end) {
+      for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+        float* texel = texels.pixels.data() + i * static_cast<size_t>(texels.channels);
+        const float* delta = change.texels.pixels.data() + i * static_cast<size_t>(fitted_channels);
+        if (std::all_of(delta, delta + fitted_channels, [](float d) { return d == 0.0f; })) continue;
+        for (int c = 0; c < fitted_channels; ++c)
+          texel[c] = std::clamp(texel[c] + delta[c], range.low, range.high);
+        if (map.slot == Slot::kNormal) {
+          const vec3 n = glm::normalize(vec3(texel[0], texel[1], texel[2]));
+          texel[0] = n.x, texel[1] = n.y, texel[2] = n.z;
+        }
+      }
+    });
+  }
+  return maps;
+}
+
+Parameters parameters_of(std::span<const FittedMap> fitted) {
+  Parameters parameters;
+  for (const FittedMap& map : fitted) parameters.push_back(map.field.levels);
+  return parameters;
+}
+
+void set_parameters(std::vector<FittedMap>& fitted, const Parameters& parameters) {
+  for (size_t i = 0; i < fitted.size(); ++i) {
+    fitted[i].field.levels = parameters[i];
+    compose(fitted[i].field);
+  }
+}
+
+FitCheckpoint make_checkpoint(const FitState& state) {
+  FitCheckpoint checkpoint;
+  checkpoint.next_iteration = state.next_iteration;
+  std::vector<uint8_t>& bytes = checkpoint.bytes;
+  const auto write = [&](const std::vector<float>& values) { append(bytes, values); };
+  for (const FittedMap& map : state.fitted) {
+    append(bytes, map.field.num_steps.data(), map.field.num_steps.size() * sizeof(int));
+    for (const auto* images : {&map.field.levels, &map.field.first_moment, &map.field.second_moment})
+      for (const Image& image : *images) write(image.pixels);
+  }
+  each_parameter(write, state.cache_parameters);
+  each_parameter(write, state.best_parameters);
+  append(bytes, &state.best_loss, sizeof(float));
+  write(state.loss);
+  return checkpoint;
+}
+
+void restore_checkpoint(FitState& state, const FitCheckpoint& checkpoint) {
+  Reader reader(checkpoint.bytes);
+  const auto read = [&](std::vector<float>& values) { reader.read(values); };
+  state.next_iteration = checkpoint.next_iteration;
+  for (FittedMap& map : state.fitted) {
+    reader.read(map.field.num_steps.data(), map.field.num_steps.size() * sizeof(int));
+    for (auto* images : {&map.field.levels, &map.field.first_moment, &map.field.second_moment})
+      for (Image& image : *images) read(image.pixels);
+    compose(map.field);
+  }
+  state.cache_parameters = parameters_of(state.fitted);
+  each_parameter(read, state.cache_parameters);
+  state.best_parameters = parameters_of(state.fitted);
+  each_parameter(read, state.best_parameters);
+  reader.read(&state.best_loss, sizeof(float));
+  state.loss.resize(static_cast<size_t>(std::max(0, state.next_iteration)));
+  read(state.loss);
+  reader.expect_end();
+}
+
+}  // namespace patina::inverse

@@ -1,0 +1,55 @@
+// What a fit changes from iteration to iteration, how maps follow from it, and its bytes in a checkpoint.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "patina/inverse/evidence.h"
+#include "patina/inverse/fit.h"
+#include "patina/inverse/texture_field.h"
+
+namespace patina::inverse {
+
+/// One fitted map of one material.
+struct FittedMap {
+  int material = 0;
+  Slot slot = Slot::kBaseColor;
+  TextureField field;
+  Image evidence;    // [h,w,1] at the field's size: weight with which views saw the texel
+  Image may_change;  // [h,w,1] 1: seen, beside a seen texel, or used by no surface (padding); 0: surface that
+                     // no view saw
+};
+
+/// Values that each map may take; a normal's components are unbounded.
+struct Range {
+  float low, high;
+};
+Range slot_range(Slot slot);
+
+/// `maps` with every fitted map's change added to `base`, clamped, normals renormalised. Texels that must not
+/// change keep base's exact value.
+std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::MaterialMaps>& base,
+                                               std::span<const FittedMap> fitted);
+
+/// Parameters only: [map][level].
+using Parameters = std::vector<std::vector<Image>>;
+Parameters parameters_of(std::span<const FittedMap> fitted);
+void set_parameters(std::vector<FittedMap>& fitted, const Parameters& parameters);
+
+/// Everything that the next iteration depends on.
+struct FitState {
+  int next_iteration = 0;
+  std::vector<FittedMap> fitted;
+  Parameters cache_parameters;  // with which the present light cache was traced
+  Parameters best_parameters;
+  float best_loss = std::numeric_limits<float>::infinity();
+  std::vector<float> loss;  // per iteration
+};
+
+FitCheckpoint make_checkpoint(const FitState& state);
+/// Overwrites `state`, which must have been set up the same way. Throws Error{kFormat} if the bytes belong to
+/// another set-up.
+void restore_checkpoint(FitState& state, const FitCheckpoint& checkpoint);
+
+}  // namespace patina::inverse

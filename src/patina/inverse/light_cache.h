@@ -1,0 +1,71 @@
+// The light cache: for two jittered points of every pixel that counts, the surface they hit and the light
+// that arrives there, traced once and kept in eight bytes a direction. Geometry, cameras and lights never
+// change while textures are fitted, so an iteration shades and differentiates these lists without casting a
+// ray (shade.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "patina/inverse/incident_light.h"
+#include "patina/inverse/material_point.h"
+#include "patina/views/view_set.h"
+
+namespace patina::inverse {
+
+/// One incident direction, packed (light_packing.h).
+struct PackedLight {
+  uint32_t direction = 0;
+  uint32_t radiance = 0;
+};
+
+/// A camera ray's hit: half of a pixel. The two halves are independent estimates of the pixel, see
+/// relative_l2.
+struct CacheSample {
+  MaterialPoint point;
+  MapValues base;       // the starting maps at the point, before any change
+  vec3 emission{0.0f};  // W/m²/sr
+  bool hit = false;     // false: the ray met nothing, the half is black
+};
+
+/// A pixel that counts in the loss.
+struct CachePixel {
+  uint16_t view = 0;
+  uint16_t x = 0, y = 0;
+  float weight = 0;   // from loss_weight
+  vec3 target{0.0f};  // tone-mapped linear
+};
+
+struct LightCache {
+  std::vector<CachePixel> pixels;    // view by view, rows from the top
+  std::vector<CacheSample> samples;  // [pixels, 2]
+  std::vector<PackedLight> lights;   // [pixels, 2, lights_per_sample]
+  int lights_per_sample = 0;
+
+  std::span<const PackedLight> lights_of(size_t sample) const {
+    const auto n = static_cast<size_t>(lights_per_sample);
+    return {lights.data() + sample * n, n};
+  }
+  size_t bytes() const;
+};
+
+struct CacheOptions {
+  int light_samples = 32;  // directions a pixel, half of them for each of its two points
+  int max_depth = 4;       // path segments after the camera ray
+  uint64_t seed = 0;
+  uint32_t generation = 0;  // another one gives other points and directions
+};
+
+/// The pixels of all views with a positive weight. targets [H,W,3] tone-mapped linear, weights [H,W,1]; one
+/// of each a view.
+std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<const Image> targets,
+                                      std::span<const Image> weights);
+
+/// Traces the cache. Directions follow the scene's current materials, and so does the light that other
+/// surfaces reflect; `base_maps` are the asset's starting maps from which CacheSample::base is read.
+LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
+                       std::vector<CachePixel> pixels, const std::vector<asset::MaterialMaps>& base_maps,
+                       const CacheOptions& options, const Progress& progress);
+
+}  // namespace patina::inverse

@@ -1,0 +1,190 @@
+#include "patina/inverse/texture_field.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "patina/base/check.h"
+
+namespace patina::inverse {
+namespace {
+
+int wrapped(int i, int size, asset::Wrap wrap) {
+  if (wrap == asset::Wrap::kClampToEdge) return std::clamp(i, 0, size - 1);
+  const int period = wrap == asset::Wrap::kRepeat ? size : 2 * size;
+  const int m = ((i % period) + period) % period;
+  return m < size ? m : period - 1 - m;
+}
+
+std::vector<UpsampleTap> upsample_taps(int fine, int coarse, asset::Wrap wrap) {
+  std::vector<UpsampleTap> taps(static_cast<size_t>(fine));
+  for (int i = 0; i < fine; ++i) {
+    const float x =
+        (static_cast<float>(i) + 0.5f) * static_cast<float>(coarse) / static_cast<float>(fine) - 0.5f;
+    const int a = static_cast<int>(std::floor(x));
+    taps[static_cast<size_t>(i)] = {wrapped(a, coarse, wrap), wrapped(a + 1, coarse, wrap),
+                                    x - std::floor(x)};
+  }
+  return taps;
+}
+
+struct Taps {
+  std::vector<UpsampleTap> x, y;
+};
+Taps taps_between(const asset::Map& map, const Image& fine, const Image& coarse) {
+  return {upsample_taps(fine.width, coarse.width, map.wrap_s),
+          upsample_taps(fine.height, coarse.height, map.wrap_t)};
+}
+
+// fine += upsampled coarse.
+void add_upsampled(const asset::Map& map, const Image& coarse, Image& fine) {
+  const Taps taps = taps_between(map, fine, coarse);
+  const int channels = fine.channels;
+  std::vector<float> row(static_cast<size_t>(coarse.width) * static_cast<size_t>(channels));
+  for (int y = 0; y < fine.height; ++y) {
+    const UpsampleTap& ty = taps.y[static_cast<size_t>(y)];
+    const float *row_a = coarse.at(0, ty.a), *row_b = coarse.at(0, ty.b);
+    for (size_t i = 0; i < row.size(); ++i) row[i] = row_a[i] + ty.weight_b * (row_b[i] - row_a[i]);
+    float* out = fine.at(0, y);
+    for (const UpsampleTap& tx : taps.x)
+      for (int c = 0; c < channels; ++c) {
+        const float a = row[static_cast<size_t>(tx.a * channels + c)],
+                    b = row[static_cast<size_t>(tx.b * channels + c)];
+        *out++ += a + tx.weight_b * (b - a);
+      }
+  }
+}
+
+// coarse += transpose of add_upsampled applied to fine.
+void add_restricted(const asset::Map& map, const Image& fine, Image& coarse) {
+  const Taps taps = taps_between(map, fine, coarse);
+  const int channels = fine.channels;
+  std::vector<float> row(static_cast<size_t>(coarse.width) * static_cast<size_t>(channels));
+  for (int y = 0; y < fine.height; ++y) {
+    std::fill(row.begin(), row.end(), 0.0f);
+    const float* in = fine.at(0, y);
+    for (const UpsampleTap& tx : taps.x)
+      for (int c = 0; c < channels; ++c) {
+        const float value = *in++;
+        row[static_cast<size_t>(tx.a * channels + c)] += (1.0f - tx.weight_b) * value;
+        row[static_cast<size_t>(tx.b * channels + c)] += tx.weight_b * value;
+      }
+    const UpsampleTap& ty = taps.y[static_cast<size_t>(y)];
+    float *row_a = coarse.at(0, ty.a), *row_b = coarse.at(0, ty.b);
+    for (size_t i = 0; i < row.size(); ++i) {
+      row_a[i] += (1.0f - ty.weight_b) * row[i];
+      row_b[i] += ty.weight_b * row[i];
+    }
+  }
+}
+
+}  // namespace
+
+TextureField make_field(const asset::Map& map, int width, int height, int channels) {
+  PATINA_CHECK(width > 0 && height > 0 && channels > 0);
+  constexpr int kCoarsestSide = 8;
+  TextureField field;
+  field.delta.uv_set = map.uv_set;
+  field.delta.uv_transform = map.uv_transform;
+  field.delta.wrap_s = map.wrap_s;
+  field.delta.wrap_t = map.wrap_t;
+  field.delta.texels = Image(width, height, channels);
+  for (int w = width, h = height;; w = (w + 1) / 2, h = (h + 1) / 2) {
+    field.levels.emplace_back(w, h, channels);
+    if (std::max(w, h) <= kCoarsestSide) break;
+  }
+  field.first_moment = field.levels;
+  field.second_moment = field.levels;
+  field.num_steps.assign(field.levels.size(), 0);
+  return field;
+}
+
+void compose(TextureField& field) {
+  Image sum = field.levels.back();
+  for (size_t level = field.levels.size() - 1; level-- > 0;) {
+    Image finer = field.levels[level];
+    add_upsampled(field.delta, sum, finer);
+    sum = std::move(finer);
+  }
+  field.delta.texels = std::move(sum);
+}
+
+std::vector<Image> restrict_to_levels(const TextureField& field, const Image& d_delta) {
+  std::vector<Image> gradients;
+  gradients.push_back(d_delta);
+  for (size_t level = 1; level < field.levels.size(); ++level) {
+    Image coarse(field.levels[level].width, field.levels[level].height, d_delta.channels);
+    add_restricted(field.delta, gradients.back(), coarse);
+    gradients.push_back(std::move(coarse));
+  }
+  return gradients;
+}
+
+void adam_step(TextureField& field, const std::vector<Image>& gradients, int finest,
+               const AdamOptions& options) {
+  PATINA_CHECK_EQ(gradients.size(), field.levels.size());
+  for (size_t level = static_cast<size_t>(finest); level < field.levels.size(); ++level) {
+    const std::vector<float>& gradient = gradients[level].pixels;
+    std::vector<float>& m = field.first_moment[level].pixels;
+    std::vector<float>& v = field.second_moment[level].pixels;
+    std::vector<float>& x = field.levels[level].pixels;
+    const auto step = static_cast<float>(++field.num_steps[level]);
+    const float m_scale = 1.0f / (1.0f - std::pow(options.beta1, step));
+    const float v_scale = 1.0f / (1.0f - std::pow(options.beta2, step));
+    // Only texels that ever had a gradient count for the mean: most of a level may lie between the islands.
+    double sum_v = 0;
+    size_t num_reached = 0;
+    for (size_t i = 0; i < x.size(); ++i) {
+      m[i] = options.beta1 * m[i] + (1.0f - options.beta1) * gradient[i];
+      v[i] = options.beta2 * v[i] + (1.0f - options.beta2) * gradient[i] * gradient[i];
+      if (v[i] > 0.0f) sum_v += v[i], ++num_reached;
+    }
+    if (num_reached == 0) continue;
+    const float rms = std::sqrt(v_scale * static_cast<float>(sum_v / static_cast<double>(num_reached)));
+    const float epsilon = options.relative_epsilon * rms + 1e-20f;
+    for (size_t i = 0; i < x.size(); ++i)
+      x[i] -= options.learning_rate * m_scale * m[i] / (std::sqrt(v_scale * v[i]) + epsilon);
+  }
+  compose(field);
+}
+
+Image dilated(const asset::Map& map, const Image& valid, int radius) {
+  const Image& in = map.texels;
+  PATINA_CHECK(valid.width == in.width && valid.height == in.height && valid.channels == 1);
+  Image out = in;
+  std::vector<uint8_t> known(valid.pixels.size());
+  for (size_t i = 0; i < known.size(); ++i) {
+    known[i] = valid.pixels[i] > 0.0f;
+    if (!known[i])
+      std::fill_n(out.pixels.begin() + static_cast<std::ptrdiff_t>(i) * out.channels, out.channels, 0.0f);
+  }
+  const auto neighbour = [&](int x, int y) {
+    return static_cast<size_t>(wrapped(y, in.height, map.wrap_t)) * static_cast<size_t>(in.width) +
+           static_cast<size_t>(wrapped(x, in.width, map.wrap_s));
+  };
+  for (int ring = 0; ring < radius; ++ring) {
+    std::vector<size_t> filled;
+    for (int y = 0; y < in.height; ++y)
+      for (int x = 0; x < in.width; ++x) {
+        const size_t i = static_cast<size_t>(y) * static_cast<size_t>(in.width) + static_cast<size_t>(x);
+        if (known[i]) continue;
+        float* texel = out.at(x, y);
+        float num_known = 0;
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx) {
+            const size_t j = neighbour(x + dx, y + dy);
+            if (!known[j]) continue;
+            num_known += 1.0f;
+            for (int c = 0; c < out.channels; ++c)
+              texel[c] += out.pixels[j * static_cast<size_t>(out.channels) + static_cast<size_t>(c)];
+          }
+        if (num_known == 0.0f) continue;
+        for (int c = 0; c < out.channels; ++c) texel[c] /= num_known;
+        filled.push_back(i);
+      }
+    if (filled.empty()) break;
+    for (const size_t i : filled) known[i] = 1;
+  }
+  return out;
+}
+
+}  // namespace patina::inverse
