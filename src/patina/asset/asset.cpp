@@ -1,1 +1,102 @@
 #include "patina/asset/asset.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "patina/asset/gltf_container.h"
+#include "patina/asset/gltf_materials.h"
+#include "patina/asset/gltf_scene.h"
+#include "patina/asset/obj_reader.h"
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+
+namespace patina::asset {
+namespace {
+
+Asset read_gltf(const std::filesystem::path& path, std::vector<uint8_t> file) {
+  OpenedGltf opened = open_gltf(path, std::move(file));
+  Asset asset;
+  asset.path = path;
+  asset.source = opened.document;
+  asset.warnings = std::move(opened.warnings);
+  if (const auto used = opened.document->root().find("extensionsUsed"))
+    for (size_t i = 0; i < used->size(); ++i) asset.extensions_used.push_back((*used)[i].string());
+  read_materials(*opened.document, asset);
+  read_scene(*opened.document, asset);
+  if (asset.materials.empty()) asset.materials.push_back(default_material());
+  return asset;
+}
+
+}  // namespace
+
+Asset read_asset(const std::filesystem::path& path) {
+  std::vector<uint8_t> file = read_file(path);
+  if (is_glb(file)) return read_gltf(path, std::move(file));
+  // A glTF file is a JSON object; OBJ has no line that begins with a brace or bracket.
+  const auto is_space = [](uint8_t c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
+  size_t first = file.size() >= 3 && file[0] == 0xEF && file[1] == 0xBB && file[2] == 0xBF ? 3 : 0;
+  while (first < file.size() && is_space(file[first])) ++first;
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  const uint8_t c = first < file.size() ? file[first] : 0;
+  if (c == '{' || c == '[' || extension == ".gltf") return read_gltf(path, std::move(file));
+  if (extension == ".obj") return read_obj(path, std::move(file));
+  if (extension == ".glb")
+    throw Error(ErrorCode::kFormat, path.string(), "the file does not begin with 'glTF', so it is no GLB");
+  throw Error(ErrorCode::kFormat, path.string(), "is neither glTF, GLB nor OBJ");
+}
+
+Bounds bounds(const Asset& asset) {
+  vec3 low(std::numeric_limits<float>::infinity()), high(-low);
+  for (const Primitive& primitive : asset.primitives)
+    for (const uvec3& t : primitive.triangles)
+      for (int k = 0; k < 3; ++k) {
+        low = glm::min(low, primitive.p_world[t[k]]);
+        high = glm::max(high, primitive.p_world[t[k]]);
+      }
+  if (!(low.x <= high.x))
+    throw Error(ErrorCode::kFormat, asset.path.string(),
+                "the scene holds no triangles, so there is no surface to work on");
+  const vec3 size = high - low;
+  if (!is_finite(size) || !std::isfinite(glm::length(size)))
+    throw Error(ErrorCode::kFormat, asset.path.string(),
+                "the scene is too large for single-precision numbers; scale it down");
+  if (max_component(size) <= std::numeric_limits<float>::min())
+    throw Error(ErrorCode::kFormat, asset.path.string(),
+                "all triangles lie in one point, so the scene has no size");
+  return {low, high};
+}
+
+void require_enhanceable(const Asset& asset) {
+  bounds(asset);
+  bool has_area = false;
+  for (const Primitive& primitive : asset.primitives)
+    for (size_t i = 0; i < primitive.triangles.size() && !has_area; ++i) {
+      const uvec3& t = primitive.triangles[i];
+      const glm::dvec3 a(primitive.p_world[t.x]), b(primitive.p_world[t.y]), c(primitive.p_world[t.z]);
+      has_area = glm::length(glm::cross(b - a, c - a)) > 0;
+    }
+  if (!has_area)
+    throw Error(ErrorCode::kFormat, asset.path.string(),
+                "every triangle is degenerate, so there is no surface to work on");
+  std::string without_uv;
+  bool any_uv = false;
+  for (const Primitive& primitive : asset.primitives) {
+    if (primitive.triangles.empty()) continue;
+    any_uv = any_uv || !primitive.uv.empty();
+    if (primitive.uv.empty() && without_uv.empty()) without_uv = primitive.name;
+  }
+  if (!any_uv)
+    throw Error(
+        ErrorCode::kFormat, asset.path.string(),
+        fmt::format(
+            "the meshes have no texture coordinates (mesh '{}'), so no texture can be put on them; unwrap "
+            "them first, "
+            "for instance in Blender: Edit Mode, select all, UV > Smart UV Project, then export again",
+            printable(without_uv, 60)));
+}
+
+}  // namespace patina::asset

@@ -100,4 +100,8 @@ struct Bounds {
 };
 Bounds bounds(const Asset& asset);
 
+/// Throws Error{kFormat} where nothing can be enhanced: no surface, no size, or no texture coordinates on any mesh (the message
+/// says how to get them). Meshes without UVs beside others that have them are left as they are.
+void require_enhanceable(const Asset& asset);
+
 }  // namespace patina::asset

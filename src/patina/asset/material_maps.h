@@ -2,6 +2,7 @@
 // rendering changes them, export writes them back.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <span>
 #include <string>
