@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 
 namespace patina::render {
@@ -107,14 +108,6 @@ inline Dual<N> at_least(const Dual<N>& a, float bound) {
 }
 inline float at_least(float a, float bound) {
   return a > bound ? a : bound;
-}
-
-template <size_t N>
-inline float value_of(const Dual<N>& a) {
-  return a.v;
-}
-inline float value_of(float a) {
-  return a;
 }
 
 }  // namespace patina::render

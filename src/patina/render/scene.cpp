@@ -125,7 +125,7 @@ Scene::Scene(const asset::Asset& asset, std::vector<asset::MaterialMaps> maps, E
   state.device = rtcNewDevice(nullptr);
   if (!state.device) embree_failed(nullptr, "cannot start");
   state.embree = rtcNewScene(state.device);
-  rtcSetSceneFlags(state.embree, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+  rtcSetSceneFlags(state.embree, RTC_SCENE_FLAG_ROBUST);
   for (size_t p = 0; p < state.primitives.size(); ++p) {
     const asset::Primitive& primitive = *state.primitives[p];
     const asset::AlphaMode alpha_mode = state.material(static_cast<uint32_t>(p)).alpha_mode;
