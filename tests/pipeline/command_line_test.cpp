@@ -1,0 +1,103 @@
+// The command line as a user meets it: help, exit codes, messages that say what to do, nothing left behind after a refusal.
+#include <gtest/gtest.h>
+
+#include "patina/base/files.h"
+#include "patina/pipeline/options.h"
+#include "process.h"
+#include "support.h"
+
+namespace patina::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+ProcessResult patina(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), built_program("patina").string());
+  return run_process(arguments, {.seconds = 120});
+}
+
+std::string kettle() { return (data_dir().parent_path().parent_path() / "examples" / "kettle.glb").string(); }
+std::string model() { return (data_dir() / "tiny-sd").string(); }
+
+// A run of `enhance` that must be refused with `exit_code`, a message that holds all of `words`, and no output.
+void expect_refused(int exit_code, std::vector<std::string> arguments, const std::vector<std::string>& words) {
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "out.glb";
+  arguments.insert(arguments.begin(), "enhance");
+  if (std::find(arguments.begin(), arguments.end(), "-o") == arguments.end())
+    arguments.insert(arguments.end(), {"-o", output.string()});
+  const ProcessResult result = patina(arguments);
+  EXPECT_EQ(result.exit_code, exit_code) << result.error;
+  for (const std::string& word : words) EXPECT_NE(result.error.find(word), std::string::npos) << "'" << word << "' is not in: " << result.error;
+  EXPECT_FALSE(fs::exists(output));
+}
+
+TEST(CommandLine, help_explains_every_option) {
+  const ProcessResult result = patina({"enhance", "--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  for (const pipeline::Option& option : pipeline::options()) EXPECT_NE(result.output.find("--" + option.name), std::string::npos) << option.name;
+  for (const char* command : {"render", "detail", "fit", "report", "info"}) EXPECT_EQ(patina({command, "--help"}).exit_code, 0) << command;
+  EXPECT_NE(patina({"--version"}).output.find("patina"), std::string::npos);
+}
+
+TEST(CommandLine, wrong_usage_is_exit_code_2) {
+  EXPECT_EQ(patina({}).exit_code, 2);
+  EXPECT_EQ(patina({"polish", "a.glb"}).exit_code, 2);
+  EXPECT_EQ(patina({"enhance"}).exit_code, 2);
+  EXPECT_EQ(patina({"enhance", kettle(), "--colour", "red"}).exit_code, 2);
+  expect_refused(2, {kettle()}, {"--prompt"});
+  expect_refused(2, {kettle(), "-p", "rust", "--views", "5"}, {"--views", "4, 9 or 16", "'5'"});
+  expect_refused(2, {kettle(), "-p", "rust", "--strength", "1.5"}, {"--strength", "0.01 to 1"});
+  expect_refused(2, {kettle(), "-p", "rust", "--resolution", "100"}, {"--resolution", "multiple of 8"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--material", "rubber duck"}, {"rubber duck", "it has"});
+}
+
+TEST(CommandLine, missing_and_wrong_inputs_are_named) {
+  const TemporaryFolder folder;
+  expect_refused(1, {"no-such.glb", "-p", "rust", "-m", model()}, {"no-such.glb", "no such file"});
+  const fs::path text = folder.path() / "text.glb";
+  write_file(text, std::string_view("this is no asset"));
+  expect_refused(1, {text.string(), "-p", "rust", "-m", model()}, {"text.glb"});
+  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--environment", text.string()}, {"text.glb"});
+  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--cameras", text.string()}, {"text.glb", "JSON"});
+  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--scene", text.string()}, {"text.glb"});
+}
+
+TEST(CommandLine, wrong_models_are_refused_before_anything_is_rendered) {
+  const TemporaryFolder folder;
+  expect_refused(2, {kettle(), "-p", "rust"}, {"--model"});
+  expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "none").string()}, {"none"});
+  write_file(folder.path() / "model.ckpt", std::string_view("\x80\x02}q"));
+  expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "model.ckpt").string()}, {"model.ckpt", "code"});
+}
+
+TEST(CommandLine, unwritable_output_is_refused_first) {
+  const TemporaryFolder folder;
+  write_file(folder.path() / "file", std::string_view("x"));
+  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "-o", (folder.path() / "file" / "out.glb").string()}, {"file"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "-o", (folder.path() / "out.fbx").string()}, {".glb"});
+}
+
+TEST(CommandLine, a_config_file_holds_options_and_the_command_line_wins) {
+  const TemporaryFolder folder;
+  const fs::path config = folder.path() / "config.toml";
+  write_file(config, std::string_view("prompt = \"moss\"\nviews = 5\n"));
+  expect_refused(2, {kettle(), "--config", config.string()}, {"--views", "'5'"});
+  write_file(config, std::string_view("prompt = \"moss\"\nstrength = 0.5\nelevation = [10, 30]\n"));
+  expect_refused(2, {kettle(), "--config", config.string(), "--strength", "7"}, {"--strength", "'7'"});
+  write_file(config, std::string_view("colour = \"red\"\n"));
+  expect_refused(2, {kettle(), "--config", config.string()}, {"colour", "config.toml"});
+  write_file(config, std::string_view("[[[\n"));
+  expect_refused(2, {kettle(), "--config", config.string()}, {"config.toml"});
+  expect_refused(1, {kettle(), "--config", "missing.toml"}, {"missing.toml"});
+}
+
+TEST(CommandLine, stages_say_what_comes_first) {
+  const TemporaryFolder folder;
+  const ProcessResult result = patina({"detail", folder.path().string()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.error.find("patina render"), std::string::npos) << result.error;
+}
+
+}  // namespace
+}  // namespace patina::test

@@ -1,0 +1,104 @@
+// The list of options: every option can be written and read back, ranges are checked, names are unique.
+#include "patina/pipeline/options.h"
+
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "patina/base/error.h"
+
+namespace patina::pipeline {
+namespace {
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+void set(Config& config, const std::string& name, std::vector<std::string> values) {
+  const Option* option = find_option(name);
+  ASSERT_NE(option, nullptr) << name;
+  option->set(config, values);
+}
+
+TEST(Options, names_and_aliases_are_unique_and_explained) {
+  std::set<std::string> names;
+  for (const Option& option : options()) {
+    EXPECT_TRUE(names.insert("--" + option.name).second) << option.name;
+    for (const std::string& alias : option.aliases) EXPECT_TRUE(names.insert(alias).second) << alias;
+    EXPECT_FALSE(option.help.empty()) << option.name;
+    EXPECT_FALSE(option.placeholder.empty()) << option.name;
+    EXPECT_FALSE(option.group.empty()) << option.name;
+  }
+}
+
+TEST(Options, every_value_survives_a_round_trip_through_json) {
+  Config config;
+  set(config, "prompt", {"a \"rusty\" kettle"});
+  set(config, "views", {"16"});
+  set(config, "elevation", {"-10", "33.5"});
+  set(config, "fov", {"41.25"});
+  set(config, "exposure", {"-1.5"});
+  set(config, "strength", {"0.35"});
+  set(config, "scheduler", {"dpm++2m-karras"});
+  set(config, "noise", {"paper"});
+  set(config, "bias", {"1.8"});
+  set(config, "bias-scaling", {"additive"});
+  set(config, "fit", {"base_color,metallic"});
+  set(config, "material", {"lid", "body"});
+  set(config, "seed", {"18446744073709551615"});
+  Config again;
+  apply_json(again, nlohmann::json::parse(to_json(config).dump()), "test");
+  EXPECT_EQ(to_json(again), to_json(config));
+  EXPECT_EQ(again.seed, 18446744073709551615u);
+  EXPECT_TRUE(again.fit.fit_metallic);
+  EXPECT_FALSE(again.fit.fit_roughness);
+}
+
+TEST(Options, defaults_shown_are_the_defaults_used) {
+  const Config config;
+  for (const Option& option : options()) {
+    const nlohmann::json value = option.get(config);
+    if (!value.is_number()) continue;
+    EXPECT_EQ(option.default_text, value.dump()) << option.name;
+  }
+}
+
+TEST(Options, a_value_out_of_range_names_option_range_and_value) {
+  Config config;
+  const std::string message = message_of([&] { find_option("strength")->set(config, std::vector<std::string>{"1.5"}); });
+  EXPECT_NE(message.find("--strength"), std::string::npos) << message;
+  EXPECT_NE(message.find("from 0.01 to 1"), std::string::npos) << message;
+  EXPECT_NE(message.find("1.5"), std::string::npos) << message;
+}
+
+TEST(Options, refuses_what_is_no_number_or_no_choice) {
+  Config config;
+  for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{{"steps", "ten"}, {"steps", "10.5"}, {"steps", ""},
+         {"views", "5"}, {"guidance-scale", "nan"}, {"scheduler", "magic"}, {"fit", "colour"}, {"exposure", "bright"}, {"seed", "-1"}}) {
+    EXPECT_THROW(find_option(name)->set(config, std::vector<std::string>{value}), Error) << name << " " << value;
+  }
+  EXPECT_NE(message_of([&] { find_option("scheduler")->set(config, std::vector<std::string>{"magic"}); }).find("unipc"), std::string::npos);
+}
+
+TEST(Options, a_stage_depends_on_what_it_reads_and_on_nothing_else) {
+  Config config;
+  const auto before_render = values_read_by(config, kRenderStage), before_detail = values_read_by(config, kDetailStage);
+  set(config, "prompt", {"moss"});
+  EXPECT_EQ(values_read_by(config, kRenderStage), before_render);
+  EXPECT_NE(values_read_by(config, kDetailStage), before_detail);
+}
+
+TEST(Options, refuses_unknown_names_in_files) {
+  Config config;
+  EXPECT_THROW(apply_json(config, {{"colour", 1}}, "file.json"), Error);
+  EXPECT_THROW(apply_json(config, nlohmann::json::array(), "file.json"), Error);
+  EXPECT_THROW(apply_json(config, {{"steps", {{"a", 1}}}}, "file.json"), Error);
+}
+
+}  // namespace
+}  // namespace patina::pipeline
