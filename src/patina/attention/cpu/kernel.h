@@ -1,0 +1,68 @@
+// What the driver hands to an instruction set's kernel: one block of queries of one head against all keys,
+// everything packed.
+//
+// A kernel computes transposed products, so that vector lanes are queries: Sᵀ = K Qᵀ, Oᵀ = Vᵀ Pᵀ. Maxima and
+// sums of the softmax are then vertical, keys and values are broadcast from row-major memory, and any
+// head_dim works without padding the lanes.
+#pragma once
+
+#include <cstdint>
+
+#include "patina/attention/attention.h"
+
+namespace patina::attention {
+
+inline constexpr int kBlockQueries = 64;  // lanes of a block: 8 × 8 latent pixels where a bias is given
+inline constexpr int kTileKeysMax = 128;  // bound of the kernels' tile lengths
+
+/// A key and the lanes of the block for which it is biased.
+struct BiasedKey {
+  int32_t key;
+  uint64_t lanes;
+};
+
+/// How packed keys and values lie in memory; queries follow the keys' element.
+enum class Packing {
+  kF32,        // q [d][64] f32 times scale·log2 e;   k [n][d] f32;   v [n][d] f32
+  kBf16Pairs,  // q [d₂/2][64][2] bf16 unscaled;      k [n₁₆][d₂] bf16;   v [n₂/2][d][2] bf16      (zero
+               // padding)
+  kBf16Tiles,  // q [d₂/2][64][2] bf16 unscaled;      k [n₃₂][d₂] bf16;   v [n₃₂/32][d₁₆][32] bf16 (zero
+               // padding)
+};
+// d₂: head_dim rounded up to 2 (kBf16Pairs) or 32 (kBf16Tiles); n₂, n₁₆, n₃₂ likewise to 2, 16 and 32.
+
+struct Block {
+  const void* q = nullptr;
+  const void* k = nullptr;
+  const void* v = nullptr;
+  int64_t num_keys = 0;
+  int head_dim = 0;
+  int num_lanes = kBlockQueries;      // lanes beyond hold zeros and are not read back
+  float score_scale = 1;              // bf16 packings: scale · log2 e, applied to the products; 1 for kF32
+  float beta = 0;                     // β · log2 e
+  const BiasedKey* biased = nullptr;  // ascending keys, ended by one with key = INT32_MAX
+  float* scratch = nullptr;  // [kTileKeysMax][64] f32 and [kTileKeysMax][64] bf16 behind it, 64-byte aligned
+  float* out = nullptr;      // [d₁₆][64] f32, divided by the sum
+  float* log_sum_exp = nullptr;  // [64] natural log
+};
+inline constexpr int64_t kScratchFloats = kTileKeysMax * kBlockQueries * 3 / 2;
+
+struct Kernel {
+  Packing packing;
+  void (*attend)(const Block& block);
+};
+
+/// One translation unit each, compiled for its instruction set. They hold no function that another unit could
+/// share: the linker must not pick an AVX-512 copy of an inline function for a machine without it.
+Kernel generic_kernel();
+#ifdef PATINA_X86_KERNELS
+Kernel avx2_kernel();
+Kernel avx512_kernel();
+Kernel avx512_bf16_kernel();
+Kernel amx_bf16_kernel();
+#endif
+
+/// Runs a kernel over all batches, heads and query blocks (driver.cpp).
+void run_blocks(const Arguments& arguments, const Kernel& kernel);
+
+}  // namespace patina::attention
