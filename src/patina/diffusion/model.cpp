@@ -1,0 +1,153 @@
+#include "patina/diffusion/model.h"
+
+#include <cstdio>
+
+#include <ATen/ATen.h>
+#include <ATen/Parallel.h>
+#include <c10/core/InferenceMode.h>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/base/parallel.h"
+
+namespace patina::diffusion {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Below this the networks are so small that conversions and overhead eat what bf16 wins, and f32 is exact.
+constexpr uintmax_t kLargeWeightBytes = 400'000'000;
+
+/// bf16 pays where the processor multiplies it natively and the networks are large enough to be bound by
+/// arithmetic.
+Dtype resolve(Dtype wanted, const fs::path& unet_folder) {
+  if (wanted != Dtype::kAuto) return wanted;
+  const bool native = __builtin_cpu_supports("avx512bf16");
+  return native && fs::file_size(weight_file(unet_folder)) >= kLargeWeightBytes ? Dtype::kBf16 : Dtype::kF32;
+}
+
+fs::path component(const fs::path& given, const fs::path& model, const char* name) {
+  const fs::path folder = given.empty() ? model / name : given;
+  if (fs::is_directory(folder)) return folder;
+  nn::refuse_pickle_name(folder);
+  if (fs::is_regular_file(folder)) {
+    throw Error(
+        ErrorCode::kUnsupported, folder.string(),
+        "is a single file; expected the folder of a diffusers component, with config.json and its weights");
+  }
+  throw Error(ErrorCode::kNotFound, folder.string(),
+              "does not exist; expected the folder of the model's " + std::string(name));
+}
+
+/// The networks must fit each other: what one gives is what the next takes.
+void check_fit(const Model::State& state) {
+  const auto check = [](int64_t found, int64_t expected, const char* what) {
+    if (found != expected) {
+      throw Error(ErrorCode::kFormat, "model",
+                  std::string(what) + ": found " + std::to_string(found) + ", expected " +
+                      std::to_string(expected) + "; the components belong to different models");
+    }
+  };
+  const UNetConfig& unet = state.unet.config();
+  for (const LevelConfig& level : unet.levels) {
+    if (level.down_attention || level.up_attention) {
+      check(level.cross_attention_dim, state.text_encoder.config().hidden_size,
+            "cross_attention_dim of the U-Net against the text encoder's width");
+    }
+  }
+  check(unet.in_channels, state.vae.config().latent_channels,
+        "in_channels of the U-Net against the VAE's latent channels");
+  check(unet.out_channels, unet.in_channels, "out_channels of the U-Net");
+  check(state.vae.config().in_channels, 3, "in_channels of the VAE");
+  const std::vector<int64_t> kept = skip_channels(unet);
+  for (const auto& [control, name] :
+       {std::pair(&state.controlnet_tile, "tile"), std::pair(&state.controlnet_normal, "normal")}) {
+    const UNetConfig& copy = control->config().unet;
+    const std::string what = std::string("ControlNet ") + name + ": ";
+    check(copy.in_channels, unet.in_channels, (what + "in_channels").c_str());
+    check(static_cast<int64_t>(skip_channels(copy).size()), static_cast<int64_t>(kept.size()),
+          (what + "number of residuals").c_str());
+    for (size_t i = 0; i < kept.size(); ++i)
+      check(skip_channels(copy)[i], kept[i], (what + "channels of a residual").c_str());
+    for (const LevelConfig& level : copy.levels) {
+      if (level.down_attention) {
+        check(level.cross_attention_dim, state.text_encoder.config().hidden_size,
+              (what + "cross_attention_dim").c_str());
+      }
+    }
+    check(int64_t{1} << (control->config().embedding_channels.size() - 1), state.vae.config().latent_scale(),
+          (what + "pixels a latent pixel").c_str());
+  }
+}
+
+}  // namespace
+
+Model::Model(const ModelPaths& paths, const ModelOptions& options) {
+  if (options.num_threads < 0) {
+    throw Error(ErrorCode::kUsage, "threads",
+                "is " + std::to_string(options.num_threads) + ", expected 0 (all) or more");
+  }
+  if (!fs::exists(paths.model)) {
+    throw Error(ErrorCode::kNotFound, paths.model.string(),
+                "does not exist; expected a model folder in the diffusers layout");
+  }
+  nn::refuse_pickle_name(paths.model);
+  set_num_threads(options.num_threads);
+  at::set_num_threads(patina::num_threads());
+
+  const c10::InferenceMode inference;
+  const fs::path unet = component({}, paths.model, "unet");
+  const Dtype dtype = resolve(options.dtype, unet);
+  const at::ScalarType type = dtype == Dtype::kBf16 ? at::kBFloat16 : at::kFloat;
+  state_ = std::unique_ptr<State>(
+      new State{dtype, Tokenizer(component({}, paths.model, "tokenizer")),
+                TextEncoder(component({}, paths.model, "text_encoder"), type), UNet(unet, type),
+                Vae(component(paths.vae, paths.model, "vae"), at::kFloat),
+                ControlNet(component(paths.controlnet_tile, paths.model, "controlnet_tile"), type),
+                ControlNet(component(paths.controlnet_normal, paths.model, "controlnet_normal"), type),
+                read_scheduler_config(component({}, paths.model, "scheduler"))});
+  check_fit(*state_);
+}
+
+Model::~Model() = default;
+Model::Model(Model&&) noexcept = default;
+Model& Model::operator=(Model&&) noexcept = default;
+
+int Model::latent_scale() const {
+  return static_cast<int>(state_->vae.config().latent_scale());
+}
+int Model::latent_channels() const {
+  return static_cast<int>(state_->vae.config().latent_channels);
+}
+Dtype Model::dtype() const {
+  return state_->dtype;
+}
+
+std::string Model::description() const {
+  const State& s = *state_;
+  const auto millions = [](int64_t count) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f M", static_cast<double>(count) * 1e-6);
+    return std::string(text);
+  };
+  return std::string(s.unet.config().use_linear_projection ? "Stable Diffusion 2.x"
+                                                           : "Stable Diffusion 1.x") +
+         " architecture, U-Net " + millions(s.unet.num_parameters()) + ", ControlNets 2 × " +
+         millions(s.controlnet_tile.num_parameters()) + ", VAE " + millions(s.vae.num_parameters()) +
+         ", text encoder " + millions(s.text_encoder.num_parameters()) + " parameters, " +
+         (s.dtype == Dtype::kBf16 ? "bf16" : "f32");
+}
+
+at::Tensor encode_text(const Tokenizer& tokenizer, const TextEncoder& text_encoder, const std::string& text) {
+  const size_t length =
+      std::min(tokenizer.max_length(), static_cast<size_t>(text_encoder.config().max_positions));
+  const std::vector<int64_t> ids = tokenizer.encode_padded(text, length);
+  return text_encoder(at::tensor(ids, at::kLong).unsqueeze(0)).last_hidden_state;
+}
+
+SchedulerConfig read_scheduler_config(const fs::path& folder) {
+  const fs::path file = folder / "scheduler_config.json";
+  return parse_scheduler_config(read_text_file(file, 1 << 24), file.string());
+}
+
+}  // namespace patina::diffusion

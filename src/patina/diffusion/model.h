@@ -1,0 +1,33 @@
+// What stands behind diffusion::Model: the loaded networks. Seen only by the sources that see Torch.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "patina/diffusion/controlnet.h"
+#include "patina/diffusion/detail.h"
+#include "patina/diffusion/schedulers.h"
+#include "patina/diffusion/text_encoder.h"
+#include "patina/diffusion/tokenizer.h"
+#include "patina/diffusion/unet.h"
+#include "patina/diffusion/vae.h"
+
+namespace patina::diffusion {
+
+struct Model::State {
+  Dtype dtype = Dtype::kF32;
+  Tokenizer tokenizer;
+  TextEncoder text_encoder;
+  UNet unet;
+  Vae vae;  // always f32: decoding is a hundredth of the work, and the pixels show its rounding
+  ControlNet controlnet_tile, controlnet_normal;
+  SchedulerConfig scheduler;
+};
+
+/// The text as the U-Net sees it: [1,T,D].
+at::Tensor encode_text(const Tokenizer& tokenizer, const TextEncoder& text_encoder, const std::string& text);
+
+/// <folder>/scheduler_config.json.
+SchedulerConfig read_scheduler_config(const std::filesystem::path& folder);
+
+}  // namespace patina::diffusion

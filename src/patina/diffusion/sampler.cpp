@@ -1,0 +1,93 @@
+#include "patina/diffusion/sampler.h"
+
+#include <cstring>
+
+#include <ATen/ATen.h>
+
+#include "patina/base/check.h"
+#include "patina/base/error.h"
+
+namespace patina::diffusion {
+namespace {
+
+constexpr uint32_t kStateMagic = 0x31545350;  // "PST1"
+
+std::span<const float> values_of(const at::Tensor& tensor) {
+  return {tensor.data_ptr<float>(), static_cast<size_t>(tensor.numel())};
+}
+
+}  // namespace
+
+Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
+  const int64_t batch = text.size(0);
+  PATINA_CHECK(batch == (guidance_scale == 1 ? 1 : 2));
+  const at::Tensor sample = latents.expand({batch, -1, -1, -1});
+  const at::Tensor timesteps = at::full({1}, timestep, at::kFloat);
+
+  ControlResiduals residuals;
+  for (const Control& control : controls) {
+    if (control.scale == 0) continue;
+    residuals =
+        sum(std::move(residuals), (*control.network)(sample, timesteps, text, control.hint, control.scale));
+  }
+  const at::Tensor out =
+      (*unet)({sample, timesteps, text, residuals.mid.defined() ? &residuals : nullptr, bias})
+          .to(at::kFloat)
+          .contiguous();
+  if (batch == 1) return {out, out, out};
+  const at::Tensor unconditional = out.slice(0, 0, 1), conditional = out.slice(0, 1, 2);
+  return {unconditional, conditional, unconditional + guidance_scale * (conditional - unconditional)};
+}
+
+std::vector<float> sample(const Denoiser& denoiser, const SchedulePlan& plan, SamplerState state,
+                          at::IntArrayRef shape, const SamplerCallbacks& callbacks) {
+  PATINA_CHECK_EQ(static_cast<int64_t>(state.latents.size()), c10::multiply_integers(shape));
+  while (state.next_call < plan.num_calls()) {
+    const int index = state.next_call;
+    std::vector<float> input = scale_model_input(plan, index, state.latents);
+    const Guided prediction =
+        denoiser(at::from_blob(input.data(), shape, at::kFloat), plan.timesteps[static_cast<size_t>(index)]);
+    const std::vector<float> noise =
+        needs_noise(plan, index) ? callbacks.noise(index, state.latents.size()) : std::vector<float>{};
+    state.latents = step(plan, state.scheduler, index, values_of(prediction.guided), state.latents, noise);
+    ++state.next_call;
+    if (callbacks.on_step) callbacks.on_step(state, prediction);
+  }
+  return std::move(state.latents);
+}
+
+std::vector<uint8_t> to_bytes(const SamplerState& state) {
+  const std::vector<uint8_t> scheduler = to_bytes(state.scheduler);
+  const uint64_t header[3] = {
+      kStateMagic | static_cast<uint64_t>(static_cast<uint32_t>(state.next_call)) << 32, state.latents.size(),
+      scheduler.size()};
+  const size_t latent_bytes = state.latents.size() * sizeof(float);
+  std::vector<uint8_t> bytes(sizeof header + latent_bytes + scheduler.size());
+  std::memcpy(bytes.data(), header, sizeof header);
+  std::memcpy(bytes.data() + sizeof header, state.latents.data(), latent_bytes);
+  std::memcpy(bytes.data() + sizeof header + latent_bytes, scheduler.data(), scheduler.size());
+  return bytes;
+}
+
+SamplerState sampler_state_from_bytes(std::span<const uint8_t> bytes) {
+  uint64_t header[3];
+  const auto fail = [] {
+    throw Error(ErrorCode::kFormat, "checkpoint", "is damaged or of another version; start the stage again");
+  };
+  if (bytes.size() < sizeof header) fail();
+  std::memcpy(header, bytes.data(), sizeof header);
+  const uint64_t rest = bytes.size() - sizeof header;
+  if ((header[0] & 0xFFFFFFFFu) != kStateMagic || header[1] > rest / sizeof(float) ||
+      header[2] != rest - header[1] * sizeof(float))
+    fail();
+
+  SamplerState state;
+  state.next_call = static_cast<int>(header[0] >> 32);
+  state.latents.resize(header[1]);
+  const size_t latent_bytes = header[1] * sizeof(float);
+  std::memcpy(state.latents.data(), bytes.data() + sizeof header, latent_bytes);
+  state.scheduler = scheduler_state_from_bytes(bytes.subspan(sizeof header + latent_bytes));
+  return state;
+}
+
+}  // namespace patina::diffusion

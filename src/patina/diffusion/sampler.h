@@ -1,0 +1,64 @@
+// From noise to latents: the loop over a scheduler's steps, and the guided network that it calls.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "patina/base/progress.h"
+#include "patina/diffusion/controlnet.h"
+#include "patina/diffusion/schedulers.h"
+#include "patina/diffusion/unet.h"
+
+namespace patina::diffusion {
+
+/// A ControlNet with its condition image already embedded.
+struct Control {
+  const ControlNet* network = nullptr;
+  at::Tensor hint;  // [1,C,H,W]
+  float scale = 1;
+};
+
+/// What the network says about one latent.
+struct Guided {
+  at::Tensor unconditional, conditional;  // [1,C,H,W] f32; without guidance both are `guided`
+  at::Tensor guided;
+};
+
+/// The network with everything fixed but latent and time. Classifier-free guidance [Ho2022] runs both prompts
+/// as one batch.
+struct Denoiser {
+  const UNet* unet = nullptr;
+  std::vector<Control> controls;
+  at::Tensor text;  // [2,T,D], negative prompt first; [1,T,D] without guidance
+  float guidance_scale = 1;
+  const nn::SelfAttentionBias* bias = nullptr;  // null: none
+
+  /// latents [1,C,H,W] f32, scaled as the scheduler asks.
+  Guided operator()(const at::Tensor& latents, double timestep) const;
+};
+
+/// Where a run stands between two steps.
+struct SamplerState {
+  int next_call = 0;
+  std::vector<float> latents;  // [C,H,W], unscaled
+  SchedulerState scheduler;
+
+  bool operator==(const SamplerState&) const = default;
+};
+/// Bytes that restore the state exactly. from_bytes throws Error{kFormat} if they are not what to_bytes made.
+std::vector<uint8_t> to_bytes(const SamplerState& state);
+SamplerState sampler_state_from_bytes(std::span<const uint8_t> bytes);
+
+struct SamplerCallbacks {
+  /// Unit-variance noise [C,H,W] for call `index`; asked for only where the scheduler draws noise.
+  std::function<std::vector<float>(int index, size_t size)> noise;
+  /// After every call; may be empty.
+  std::function<void(const SamplerState& state, const Guided& prediction)> on_step;
+};
+
+/// Runs the plan's calls from `state` on and returns the last latents [C,H,W]. `shape` is [1,C,H,W].
+std::vector<float> sample(const Denoiser& denoiser, const SchedulePlan& plan, SamplerState state,
+                          at::IntArrayRef shape, const SamplerCallbacks& callbacks);
+
+}  // namespace patina::diffusion
