@@ -22,6 +22,7 @@ struct alignas(64) TileConfig {
   uint8_t rows[16] = {16, 16, 16, 16, 16, 16, 16, 16};
 };
 static_assert(sizeof(TileConfig) == 64);
+constexpr TileConfig kTileConfig;  // in memory: GCC 12 drops stores to a local that only LDTILECFG reads
 
 /// Tiles 0 to 3 sum a 2 × 2 group of results, 4 and 5 hold rows (keys or value dimensions), 6 and 7 lanes.
 struct TileProducts {
@@ -30,8 +31,7 @@ struct TileProducts {
 
   explicit TileProducts(int dim)
       : head_dim(dim), score_dim((dim + 31) / 32 * 32), value_dim((dim + 15) / 16 * 16) {
-    const TileConfig config;
-    _tile_loadconfig(&config);
+    _tile_loadconfig(&kTileConfig);
   }
   ~TileProducts() { _tile_release(); }
   TileProducts(const TileProducts&) = delete;
