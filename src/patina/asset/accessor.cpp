@@ -142,6 +142,14 @@ void for_each_element(const SourceDocument& d, const AccessorInfo& info, Visit v
   const Component type = component_of(type_json);
   if (type != Component::kUint8 && type != Component::kUint16 && type != Component::kUint32)
     type_json.fail("sparse indices must be unsigned integers (5121, 5123 or 5125)");
+  // The Khronos validator refuses this too (BUFFER_VIEW_TARGET_OVERRIDE): one view cannot be vertex data and
+  // a list of changes to it.
+  if (const auto base = info.json.find("bufferView"))
+    if (sparse->at("values").at("bufferView").json() == base->json() ||
+        indices_json.at("bufferView").json() == base->json())
+      sparse->fail(
+          "the sparse data lies in the same buffer view as the elements it replaces; it needs one of its "
+          "own");
   const Elements indices = elements_of(d, indices_json, count, component_bytes(type), false);
   const Elements values = elements_of(d, sparse->at("values"), count, element, false);
   for (size_t k = 0; k < count; ++k) {

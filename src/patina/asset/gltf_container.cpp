@@ -170,6 +170,25 @@ void check_views(SourceDocument& d) {
   }
 }
 
+// Names of the files beside the asset, for export to carry over. A reference that must not be followed is
+// left to whoever needs it.
+void note_references(SourceDocument& d) {
+  for (const SourceBuffer& buffer : d.buffers)
+    if (!buffer.reference.empty()) d.references.push_back(buffer.reference);
+  const auto images = d.root().find("images");
+  for (size_t i = 0; images && i < images->size(); ++i) {
+    const auto uri = (*images)[i].find("uri");
+    if (!uri || is_data_uri(uri->string())) continue;
+    try {
+      const std::string reference = percent_decoded(uri->string(), uri->where());
+      resolve_inside(d.folder(), reference, uri->where());
+      d.references.push_back(reference);
+    } catch (const Error&) {
+      continue;
+    }
+  }
+}
+
 }  // namespace
 
 MemoryBudget memory_budget(uint64_t source_bytes) {
@@ -206,6 +225,7 @@ OpenedGltf open_gltf(const std::filesystem::path& path, std::vector<uint8_t> fil
   check_asset_and_extensions(*d);
   load_buffers(*d);
   check_views(*d);
+  note_references(*d);
   return {std::move(d), std::move(warnings)};
 }
 

@@ -1,5 +1,5 @@
-// Material maps: what a material is worth at every texel, factors multiplied in, linear. The renderer reads them, inverse
-// rendering changes them, export writes them back.
+// Material maps: what a material is worth at every texel, factors multiplied in, linear. The renderer reads
+// them, inverse rendering changes them, export writes them back.
 #pragma once
 
 #include <array>
@@ -39,10 +39,13 @@ struct MaterialMaps {
 std::vector<MaterialMaps> resolve_materials(const Asset& asset);
 
 /// `uv` as the mesh has it → the map's own UV (transform applied, not wrapped).
-inline vec2 map_uv(const Map& map, const vec2& uv) { return vec2(map.uv_transform * vec3(uv, 1.0f)); }
+inline vec2 map_uv(const Map& map, const vec2& uv) {
+  return vec2(map.uv_transform * vec3(uv, 1.0f));
+}
 
-/// The four texels and weights of a bilinear look-up at `uv_map` (from map_uv), wrap modes applied. Indices are pixel
-/// offsets y·width + x, weights sum to one: the same look-up serves reading and splatting gradients.
+/// The four texels and weights of a bilinear look-up at `uv_map` (from map_uv), wrap modes applied. Indices
+/// are pixel offsets y·width + x, weights sum to one: the same look-up serves reading and splatting
+/// gradients.
 struct BilinearTap {
   std::array<int, 4> texel;
   std::array<float, 4> weight;
@@ -53,7 +56,8 @@ BilinearTap bilinear_tap(const Map& map, const vec2& uv_map);
 float sample1(const Map& map, const vec2& uv_map);
 vec3 sample3(const Map& map, const vec2& uv_map);
 
-/// `map` resampled to width × height texels (area-averaged down, bilinear up, wrap modes honoured; normals renormalised by the caller).
+/// `map` resampled to width × height texels (area-averaged down, bilinear up, wrap modes honoured; normals
+/// renormalised by the caller).
 Map resized(const Map& map, int width, int height);
 
 /// Which maps of a material were changed and shall be written.
@@ -62,22 +66,24 @@ struct ChangedMaps {
   bool any() const { return base_color || roughness || metallic || normal; }
 };
 
-/// Writes the asset with the changed maps of its materials to `path` (.glb, .gltf or .obj by extension; textures of .gltf
-/// and .obj beside it). maps and changed have one entry a material. Materials without a change, and every other byte of
-/// JSON and buffers (extensions, extras, animation, skins, names), are carried over as they were. Packed channels
-/// (occlusion), samplers, texture transforms and texCoord are kept; images shared with an unchanged slot are copied
-/// first. Atomic: the old file or the whole new one. Throws Error{kIo, kUnsupported}.
-void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::span<const ChangedMaps> changed,
-                  const std::filesystem::path& path);
+/// Writes the asset with the changed maps of its materials to `path` (.glb, .gltf or .obj by extension;
+/// textures of .gltf and .obj beside it). maps and changed have one entry a material. Materials without a
+/// change, and every other byte of JSON and buffers (extensions, extras, animation, skins, names), are
+/// carried over as they were. Packed channels (occlusion), samplers, texture transforms and texCoord are
+/// kept; images shared with an unchanged slot are copied first. Atomic: the old file or the whole new one.
+/// Throws Error{kIo, kUnsupported}.
+void export_asset(const Asset& asset, std::span<const MaterialMaps> maps,
+                  std::span<const ChangedMaps> changed, const std::filesystem::path& path);
 
-/// What `patina info` tells of the UVs of one material; texel figures on a 1024² raster of the unit tile (UVs wrapped).
+/// What `patina info` tells of the UVs of one material; texel figures on a 1024² raster of the unit tile (UVs
+/// wrapped).
 struct UvState {
-  bool missing = false;            // some primitive has no TEXCOORD_0
-  float covered = 0;               // share of the tile that some triangle covers
-  float overlapping = 0;           // share of the covered texels that more than one triangle covers
-  float mirrored = 0;              // share of triangles in the minority winding
-  float zero_area = 0;             // share of triangles without UV area
-  vec2 min{0.0f}, max{0.0f};       // range before wrapping
+  bool missing = false;       // some primitive has no TEXCOORD_0
+  float covered = 0;          // share of the tile that some triangle covers
+  float overlapping = 0;      // share of the covered texels that more than one triangle covers
+  float mirrored = 0;         // share of triangles in the minority winding
+  float zero_area = 0;        // share of triangles without UV area
+  vec2 min{0.0f}, max{0.0f};  // range before wrapping
 };
 std::vector<UvState> uv_states(const Asset& asset);
 

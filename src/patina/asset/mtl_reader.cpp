@@ -21,10 +21,11 @@ float roughness_of_exponent(float exponent) {
 
 class MtlReader {
  public:
-  MtlReader(const std::filesystem::path& folder, const std::filesystem::path& path,
-            std::vector<std::string>& warnings)
+  MtlReader(const std::string& asset_name, const std::filesystem::path& folder,
+            const std::filesystem::path& path, std::vector<std::string>& warnings)
       : folder_(folder),
-        name_(path.string()),
+        library_(path),
+        name_(fmt::format("{}: material library {}", asset_name, path.filename().string())),
         text_(read_text_file(path, uint64_t{1} << 26)),
         warnings_(warnings) {}
 
@@ -50,7 +51,7 @@ class MtlReader {
   }
 
  private:
-  std::string where() const { return fmt::format("{}: line {}", name_, line_->number); }
+  std::string where() const { return fmt::format("{}, line {}", name_, line_->number); }
   [[noreturn]] void fail(const std::string& message) const {
     throw Error(ErrorCode::kFormat, where(), message);
   }
@@ -174,8 +175,7 @@ class MtlReader {
     std::string reference(rest);
     std::replace(reference.begin(), reference.end(), '\\', '/');  // written on Windows
     // Names are relative to the library's own folder, which may lie below the asset's.
-    const std::filesystem::path library_folder =
-        std::filesystem::path(name_).parent_path().lexically_relative(folder_);
+    const std::filesystem::path library_folder = library_.parent_path().lexically_relative(folder_);
     out.path = resolve_inside(
         folder_, library_folder.empty() ? reference : (library_folder / reference).string(), where());
     std::error_code ignored;
@@ -185,7 +185,7 @@ class MtlReader {
     return out;
   }
 
-  std::filesystem::path folder_;
+  std::filesystem::path folder_, library_;
   std::string name_, text_;
   std::vector<std::string>& warnings_;
   std::map<std::string, MtlMaterial> materials_;
@@ -196,10 +196,11 @@ class MtlReader {
 
 }  // namespace
 
-std::map<std::string, MtlMaterial> read_mtl(const std::filesystem::path& folder,
+std::map<std::string, MtlMaterial> read_mtl(const std::string& asset_name,
+                                            const std::filesystem::path& folder,
                                             const std::filesystem::path& path,
                                             std::vector<std::string>& warnings) {
-  return MtlReader(folder, path, warnings).read();
+  return MtlReader(asset_name, folder, path, warnings).read();
 }
 
 }  // namespace patina::asset

@@ -24,7 +24,8 @@ struct MtlMaterial {
 
 /// Reads one library. `folder` is the asset's; nothing outside of it is opened. Throws Error naming file and
 /// line.
-std::map<std::string, MtlMaterial> read_mtl(const std::filesystem::path& folder,
+std::map<std::string, MtlMaterial> read_mtl(const std::string& asset_name,
+                                            const std::filesystem::path& folder,
                                             const std::filesystem::path& path,
                                             std::vector<std::string>& warnings);
 

@@ -250,7 +250,8 @@ class ObjReader {
         continue;
       }
       document_->mtl_references.push_back(name);
-      for (auto& [material_name, mtl] : read_mtl(document_->folder(), path, asset_.warnings))
+      document_->references.push_back(name);
+      for (auto& [material_name, mtl] : read_mtl(document_->name, document_->folder(), path, asset_.warnings))
         if (!material_numbers_.contains(material_name))
           add_material(material_name, with_textures(std::move(mtl)));
     }
@@ -261,14 +262,16 @@ class ObjReader {
     const auto known = images_.find(key);
     if (known != images_.end()) return known->second;
     const auto bytes = read_file(path);
-    const ImageHeader header = inspect_image(bytes, path.string());
+    const std::string where = document_->name + ": texture " + path.filename().string();
+    const ImageHeader header = inspect_image(bytes, where);
+    document_->references.push_back(path.lexically_relative(document_->folder()).string());
     image_bytes_ += uint64_t{4} * static_cast<uint64_t>(header.width) * static_cast<uint64_t>(header.height) *
                     static_cast<uint64_t>(header.channels);
     encoded_bytes_ += bytes.size();
     if (image_bytes_ > memory_budget(document_->file.size() + encoded_bytes_).image_bytes)
-      throw Error(ErrorCode::kLimit, path.string(),
+      throw Error(ErrorCode::kLimit, where,
                   "the images up to this one decode to more memory than files of this size may");
-    return images_[key] = add_image(decode_image(bytes, path.string()), path.stem().string());
+    return images_[key] = add_image(decode_image(bytes, where), path.stem().string());
   }
 
   int add_image(Image image, const std::string& name) {

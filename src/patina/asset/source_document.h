@@ -39,8 +39,11 @@ struct SourceDocument {
   std::vector<SourceBuffer> buffers;
   std::vector<std::span<const uint8_t>> views;  // bufferViews, checked against their buffers
 
+  std::vector<std::string>
+      references;  // decoded relative paths of all other files that the asset names, found or not
+
   // OBJ
-  std::vector<std::string> mtl_references;  // decoded relative paths of material libraries that were found
+  std::vector<std::string> mtl_references;  // relative paths of the material libraries that were found
 
   std::filesystem::path folder() const { return path.parent_path(); }
   std::string_view json_text() const {

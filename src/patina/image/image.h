@@ -8,8 +8,8 @@
 
 namespace patina {
 
-/// pixels [height, width, channels] f32. Colour space and range are stated where an image is made; pixel (x, y)
-/// covers [x, x+1) × [y, y+1), its centre lies at +0.5, the origin is top left.
+/// pixels [height, width, channels] f32. Colour space and range are stated where an image is made; pixel (x,
+/// y) covers [x, x+1) × [y, y+1), its centre lies at +0.5, the origin is top left.
 struct Image {
   int width = 0;
   int height = 0;
@@ -18,13 +18,17 @@ struct Image {
 
   Image() = default;
   Image(int width_, int height_, int channels_, float value = 0.0f)
-      : width(width_), height(height_), channels(channels_),
-        pixels(static_cast<size_t>(width_) * static_cast<size_t>(height_) * static_cast<size_t>(channels_), value) {}
+      : width(width_),
+        height(height_),
+        channels(channels_),
+        pixels(static_cast<size_t>(width_) * static_cast<size_t>(height_) * static_cast<size_t>(channels_),
+               value) {}
 
   bool empty() const { return pixels.empty(); }
   size_t num_pixels() const { return static_cast<size_t>(width) * static_cast<size_t>(height); }
   size_t offset(int x, int y) const {
-    return (static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)) * static_cast<size_t>(channels);
+    return (static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)) *
+           static_cast<size_t>(channels);
   }
   float* at(int x, int y) { return pixels.data() + offset(x, y); }
   const float* at(int x, int y) const { return pixels.data() + offset(x, y); }

@@ -34,4 +34,9 @@ ImageHeader inspect_image(std::span<const uint8_t> bytes, const std::string& nam
 ImageHeader inspect_hdr(std::span<const uint8_t> bytes, const std::string& name,
                         const ImageLimits& limits = {});
 
+/// `bytes` of an inspected file with nothing left but what makes the pixels: text, Exif, XMP, ICC, gamma and
+/// application data are taken out (PNG, JPEG) or made opaque (EXR). Decoders parse such data although nobody
+/// asks for it, and some can be brought down by it.
+std::vector<uint8_t> without_metadata(std::span<const uint8_t> bytes);
+
 }  // namespace patina

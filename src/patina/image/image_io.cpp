@@ -50,12 +50,15 @@ const char* plugin_name(ImageFormat format) {
 
 // An opened decoder over bytes in memory. The proxy must outlive the input.
 struct Decoder {
+  std::vector<uint8_t> pure;
   OIIO::Filesystem::IOMemReader proxy;
   std::unique_ptr<OIIO::ImageInput> input;
   OIIO::ImageSpec spec;
 
   Decoder(std::span<const uint8_t> bytes, const ImageHeader& header, const std::string& name)
-      : proxy(bytes.data(), bytes.size()), input(OIIO::ImageInput::create(plugin_name(header.format))) {
+      : pure(without_metadata(bytes)),
+        proxy(pure.data(), pure.size()),
+        input(OIIO::ImageInput::create(plugin_name(header.format))) {
     if (!input)
       throw Error(
           ErrorCode::kUnsupported, name,
