@@ -34,6 +34,9 @@ struct ModelOptions {
   int num_threads = 0;                        // 0: all processors
 };
 
+/// Looks at the folders and weight files of a model without loading it. Throws Error that names what is missing, broken or a pickle.
+void check_model(const ModelPaths& paths);
+
 /// A loaded model: weights are memory-mapped. Opaque; move-only.
 class Model {
  public:
