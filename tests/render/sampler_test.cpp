@@ -139,7 +139,7 @@ TEST(sampler, environment_samples_follow_their_density) {
       ASSERT_GT(sample.pdf, 0.0f);
       ASSERT_NEAR(glm::length(d), 1.0f, 1e-5f);
       const double u =
-          0.5 + std::atan2(static_cast<double>(d.x), -static_cast<double>(d.z)) / (2 * std::numbers::pi);
+          0.5 + std::atan2(static_cast<double>(d.z), static_cast<double>(d.x)) / (2 * std::numbers::pi);
       const double v = std::acos(std::clamp(static_cast<double>(d.y), -1.0, 1.0)) / std::numbers::pi;
       const int x = std::clamp(static_cast<int>(u * width), 0, width - 1),
                 y = std::clamp(static_cast<int>(v * height), 0, height - 1);
@@ -154,7 +154,7 @@ TEST(sampler, environment_samples_follow_their_density) {
         const auto at = [&](double dx, double dy) {
           const double azimuth = 2 * std::numbers::pi * ((x + dx) / width - 0.5);
           const double z = row_cosine(y) + dy * (row_cosine(y + 1) - row_cosine(y)), r = std::sqrt(1 - z * z);
-          return vec3(glm::dvec3(r * std::sin(azimuth), z, -r * std::cos(azimuth)));
+          return vec3(glm::dvec3(r * std::cos(azimuth), z, r * std::sin(azimuth)));
         };
         const double mass = environment.pdf(at(0.5, 0.5)) * solid_angle;
         EXPECT_NEAR(environment.pdf(at(0.9, 0.1)) * solid_angle, mass, 1e-5 * mass);

@@ -13,7 +13,7 @@ namespace {
 vec2 map_from_direction(const vec3& d) {
   // The horizontal length keeps the polar angle accurate near the poles, where acos(y) loses half its digits.
   const float horizontal = std::sqrt(d.x * d.x + d.z * d.z);
-  return {0.5f + std::atan2(d.x, -d.z) * (0.5f * kInvPi), std::atan2(horizontal, d.y) * kInvPi};
+  return {0.5f + std::atan2(d.z, d.x) * (0.5f * kInvPi), std::atan2(horizontal, d.y) * kInvPi};
 }
 
 int wrapped(int x, int width) {
@@ -136,7 +136,7 @@ Environment::Sample Environment::sample(const vec2& u) const {
   const auto sine = static_cast<float>(std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine))));
   const float azimuth =
       2.0f * kPi * ((static_cast<float>(column.index) + column.inside) / static_cast<float>(width) - 0.5f);
-  const vec3 direction(sine * std::sin(azimuth), static_cast<float>(cosine), -sine * std::cos(azimuth));
+  const vec3 direction(sine * std::cos(azimuth), static_cast<float>(cosine), sine * std::sin(azimuth));
   // The density of the texel that was chosen, not of the one that a rounded direction falls into: beside a
   // bright texel that one may be next to zero.
   return {direction, radiance(direction), texel_pdf(column.index, row.index)};

@@ -8,7 +8,8 @@
 
 namespace patina::render {
 
-/// Direction ↔ map: the map's centre column looks along -Z, its right half toward +X, its top row at +Y, as glTF viewers and Blender show it.
+/// Direction ↔ map: the map's centre column looks along +X, its right half toward +Z, its top row at +Y, as Blender shows it
+/// around an imported glTF asset and as glTF viewers built on three.js do.
 class Environment {
  public:
   /// radiance [H,W,3] linear, non-negative, finite, W/m²/sr per unit; builds the sampling tables. Throws Error{kFormat}.

@@ -44,8 +44,8 @@ Environment studio_environment() {
     for (int x = 0; x < kWidth; ++x) {
       const float polar = kPi * (static_cast<float>(y) + 0.5f) / kHeight;
       const float azimuth = 2.0f * kPi * ((static_cast<float>(x) + 0.5f) / kWidth - 0.5f);
-      const vec3 direction(std::sin(polar) * std::sin(azimuth), std::cos(polar),
-                           -std::sin(polar) * std::cos(azimuth));
+      const vec3 direction(std::sin(polar) * std::cos(azimuth), std::cos(polar),
+                           std::sin(polar) * std::sin(azimuth));
       const float height = 0.5f + 0.5f * direction.y;
       vec3 light = glm::mix(vec3(0.22f, 0.21f, 0.20f), vec3(0.62f, 0.64f, 0.67f),
                             glm::smoothstep(0.15f, 0.95f, height));
