@@ -24,57 +24,66 @@ FieldTable table_of(std::span<const FittedMap> fitted) {
   return table;
 }
 
-// Adds the field's value to `value` within the slot's range. Returns a bit per channel that a bound holds
-// back, low bounds in bits 0 to 2, high bounds in bits 3 to 5.
-uint8_t add_change(const FittedMap* map, const vec2& uv, float* value) {
-  if (!map) return 0;
+// How far the stored values of a sample lie beyond their bounds, signed; zero inside.
+struct Overshoot {
+  vec3 base_color{0.0f};
+  float roughness = 0, metallic = 0;
+  vec3 normal{0.0f};
+};
+
+// Adds the field's change to `value`, kept within the slot's range; `overshoot` gets what the range cut off.
+void add_change(const FittedMap* map, const vec2& uv, float* value, float* overshoot) {
+  if (!map) return;
   const asset::Map& delta = map->field.delta;
   const asset::BilinearTap tap = asset::bilinear_tap(delta, uv);
   const auto channels = static_cast<size_t>(delta.texels.channels);
   const Range range = slot_range(map->slot);
-  uint8_t held = 0;
   for (size_t c = 0; c < channels; ++c) {
     float change = 0;
     for (size_t t = 0; t < 4; ++t)
       change += tap.weight[t] * delta.texels.pixels[static_cast<size_t>(tap.texel[t]) * channels + c];
-    const float moved = value[c] + change;
-    value[c] = std::clamp(moved, range.low, range.high);
-    if (moved < range.low) held |= static_cast<uint8_t>(1u << c);
-    if (moved > range.high) held |= static_cast<uint8_t>(8u << c);
+    const float moved = stored_from_value(map->slot, value[c]) + change;
+    const float kept = std::clamp(moved, range.low, range.high);
+    value[c] = value_from_stored(map->slot, kept);
+    overshoot[c] = moved - kept;
   }
-  return held;
 }
 
 struct CurrentValues {
   MapValues values;
-  std::array<uint8_t, kNumSlots> held{};
+  Overshoot overshoot;
 };
 CurrentValues current_values(const FieldTable& table, const CacheSample& sample) {
   CurrentValues current{sample.base, {}};
   if (sample.point.material >= table.size()) return current;
   const auto& maps = table[sample.point.material];
-  const auto add = [&](Slot slot, float* value) {
+  const auto add = [&](Slot slot, float* value, float* overshoot) {
     const auto s = static_cast<size_t>(slot);
-    current.held[s] = add_change(maps[s], sample.point.uv[s], value);
+    add_change(maps[s], sample.point.uv[s], value, overshoot);
   };
-  add(Slot::kBaseColor, &current.values.base_color.x);
-  add(Slot::kRoughness, &current.values.roughness);
-  add(Slot::kMetallic, &current.values.metallic);
-  add(Slot::kNormal, &current.values.normal.x);
+  add(Slot::kBaseColor, &current.values.base_color.x, &current.overshoot.base_color.x);
+  add(Slot::kRoughness, &current.values.roughness, &current.overshoot.roughness);
+  add(Slot::kMetallic, &current.values.metallic, &current.overshoot.metallic);
+  add(Slot::kNormal, &current.values.normal.x, &current.overshoot.normal.x);
   return current;
 }
 
-// A value at its bound gets no gradient that pushes it further out.
-float inward(float gradient, uint8_t held, int channel) {
-  if ((held & (1u << channel)) && gradient > 0.0f) return 0.0f;
-  if ((held & (8u << channel)) && gradient < 0.0f) return 0.0f;
-  return gradient;
+// Beyond a bound the data say nothing about how far to go; a spring leads back, so that a value that overshot
+// once is not lost to later iterations. Inside, the gradient is the data's.
+float bounded(float gradient, float overshoot, float weight) {
+  if (overshoot == 0.0f) return gradient;
+  const float inward = overshoot > 0.0f ? std::max(gradient, 0.0f) : std::min(gradient, 0.0f);
+  return inward + weight * overshoot;
 }
-void keep_inward(MapGradient& gradient, const std::array<uint8_t, kNumSlots>& held) {
-  for (int c = 0; c < 3; ++c)
-    gradient.base_color[c] = inward(gradient.base_color[c], held[static_cast<size_t>(Slot::kBaseColor)], c);
-  gradient.roughness = inward(gradient.roughness, held[static_cast<size_t>(Slot::kRoughness)], 0);
-  gradient.metallic = inward(gradient.metallic, held[static_cast<size_t>(Slot::kMetallic)], 0);
+// From the map values to what the fitted maps store.
+void to_stored(MapGradient& gradient, const CurrentValues& current, float weight) {
+  for (int c = 0; c < 3; ++c) {
+    const float stored = stored_from_value(Slot::kBaseColor, current.values.base_color[c]);
+    gradient.base_color[c] = bounded(gradient.base_color[c] * d_value_d_stored(Slot::kBaseColor, stored),
+                                     current.overshoot.base_color[c], weight);
+  }
+  gradient.roughness = bounded(gradient.roughness, current.overshoot.roughness, weight);
+  gradient.metallic = bounded(gradient.metallic, current.overshoot.metallic, weight);
 }
 
 const float* slot_gradient(const MapGradient& gradient, Slot slot) {
@@ -110,13 +119,13 @@ Evaluation evaluate(const LightCache& cache, std::span<const FittedMap> fitted, 
         radiance[half] = shade(model, sample, shading[half], cache.lights_of(2 * i + half));
       }
       const CachePixel& pixel = cache.pixels[i];
-      const PairLoss loss = relative_l2(radiance[0], radiance[1], pixel.target, gain);
+      const PixelLoss loss = relative_l2(0.5f * (radiance[0] + radiance[1]), pixel.target, gain);
       pixel_loss[i] = pixel.weight * loss.value;
       for (size_t half = 0; half < 2; ++half) {
         const size_t s = 2 * i + half;
-        const vec3 d_radiance = pixel.weight * (half == 0 ? loss.d_radiance_a : loss.d_radiance_b);
+        const vec3 d_radiance = 0.5f * pixel.weight * loss.d_radiance;
         gradients[s] = shade_adjoint(model, cache.samples[s], shading[half], cache.lights_of(s), d_radiance);
-        keep_inward(gradients[s], current[half].held);
+        to_stored(gradients[s], current[half], pixel.weight);
       }
     }
   });

@@ -21,12 +21,34 @@ using Clock = std::chrono::steady_clock;
 // The light cache is traced this often in a fit, each time with new points and directions, so that no fixed
 // noise is fitted.
 constexpr int kGenerations = 8;
-// Loss per texel and squared change, in units of one fully weighted pixel's loss: holds what the views leave
-// undecided.
-constexpr float kPull = 1e-3f;
-// The first quarter of the iterations moves levels from a quarter of the finest size down, the second from a
+// The prior on a fitted map. Each pyramid level holds detail of one size; `detail` is the cost of a texel's
+// squared coefficient at the finest level, in units of one fully weighted pixel's loss, a quarter of that a
+// level up, and so on: where the views say little, the smoother answer wins, while large areas move freely.
+// Coefficients far beyond `knee` cost only linearly, so that true edges stay sharp. `change` is the cost of
+// the squared change itself, which holds what the views leave undecided.
+struct Prior {
+  float detail, knee, change;
+};
+Prior prior_of(Slot slot) {
+  switch (slot) {
+    case Slot::kBaseColor:
+      return {0.3f, 0.05f, 1e-3f};
+    case Slot::kRoughness:
+      return {1.0f, 0.1f, 1e-3f};
+    case Slot::kMetallic:
+      return {0.2f, 0.1f, 1e-3f};
+    case Slot::kNormal:
+      break;
+  }
+  return {3.0f, 0.1f, 0.5f};
+}
+
+// Normals wait until colours are about right: a wrong colour looks like a tilted surface from one side.
+constexpr float kNormalStart = 0.25f;
+
+// The first tenth of the iterations moves levels from a quarter of the finest size down, the second from a
 // half, the rest all.
-constexpr int kCoarseLevels = 2;
+constexpr int kCoarseLevels = 2, kStages = 10;
 constexpr double kSecondsBetweenCheckpoints = 20;
 
 // Sizes a map without texture gets from what the views resolve.
@@ -146,7 +168,7 @@ std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views:
 }
 
 int finest_level(const FitState& state, const FittedMap& map, int iterations) {
-  const int stage = 4 * state.next_iteration / std::max(1, iterations);
+  const int stage = kStages * state.next_iteration / std::max(1, iterations);
   return std::min(std::max(0, kCoarseLevels - stage), static_cast<int>(map.field.levels.size()) - 1);
 }
 
@@ -159,16 +181,29 @@ float learning_rate(const FitOptions& options, int iteration) {
 }
 
 void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
+  const bool normals_wait =
+      static_cast<float>(state.next_iteration) < kNormalStart * static_cast<float>(options.iterations) &&
+      (options.fit_base_color || options.fit_roughness);
   parallel_for(0, static_cast<int64_t>(state.fitted.size()), 1, [&](int64_t begin, int64_t end) {
     for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
       FittedMap& map = state.fitted[f];
+      if (map.slot == Slot::kNormal && normals_wait) continue;
+      const Prior prior = prior_of(map.slot);
       Image& gradient = evaluation.d_delta[f];
       for (size_t i = 0; i < gradient.pixels.size(); ++i)
-        gradient.pixels[i] += kPull * map.field.delta.texels.pixels[i];
+        gradient.pixels[i] += prior.change * map.field.delta.texels.pixels[i];
+      std::vector<Image> gradients = restrict_to_levels(map.field, gradient);
+      float detail = prior.detail;
+      for (size_t level = 0; level < gradients.size(); ++level, detail *= 0.25f)
+        for (size_t i = 0; i < gradients[level].pixels.size(); ++i) {
+          const float value = map.field.levels[level].pixels[i];
+          gradients[level].pixels[i] += detail * value / std::sqrt(1.0f + square(value / prior.knee));
+        }
       AdamOptions adam;
-      adam.learning_rate = learning_rate(options, state.next_iteration);
-      adam_step(map.field, restrict_to_levels(map.field, gradient),
-                finest_level(state, map, options.iterations), adam);
+      // Levels add up: with all of them in step, a texel moves at twice the rate that was asked for.
+      adam.learning_rate =
+          2.0f * learning_rate(options, state.next_iteration) / static_cast<float>(gradients.size());
+      adam_step(map.field, gradients, finest_level(state, map, options.iterations), adam);
     }
   });
 }

@@ -1,7 +1,10 @@
 // What a fit changes from iteration to iteration, how maps follow from it, and its bytes in a checkpoint.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,11 +24,25 @@ struct FittedMap {
                      // no view saw
 };
 
-/// Values that each map may take; a normal's components are unbounded.
+/// Bounds of what each map stores; a normal's components are unbounded.
 struct Range {
   float low, high;
 };
 Range slot_range(Slot slot);
+
+/// Changes are added to a map's values as a fitted map stores them. Base colour is stored as √(value + 0.01),
+/// so that a step means about as much to the eye in the dark as in the light, and black can still become
+/// lighter; the others are stored as they are.
+inline constexpr float kBaseColorOffset = 0.01f;
+inline float stored_from_value(Slot slot, float value) {
+  return slot == Slot::kBaseColor ? std::sqrt(std::max(value, 0.0f) + kBaseColorOffset) : value;
+}
+inline float value_from_stored(Slot slot, float stored) {
+  return slot == Slot::kBaseColor ? stored * stored - kBaseColorOffset : stored;
+}
+inline float d_value_d_stored(Slot slot, float stored) {
+  return slot == Slot::kBaseColor ? 2.0f * stored : 1.0f;
+}
 
 /// `maps` with every fitted map's change added to `base`, clamped, normals renormalised. Texels that must not
 /// change keep base's exact value.

@@ -39,7 +39,7 @@ struct AdamOptions {
   float beta1 = 0.9f, beta2 = 0.99f;
   /// Added to √v, as a share of its root mean square over the level: texels that hardly any pixel sees then
   /// move in proportion to their gradient instead of at full speed.
-  float relative_epsilon = 0.3f;
+  float relative_epsilon = 0.1f;
 };
 
 /// One step of Adam [Kingma2015] on levels `finest` and coarser; composes afterwards.

@@ -1,0 +1,43 @@
+// A fit whose answer is known: an asset's textures are flattened to their means, views of the true ones are
+// the targets. Shared by the test of the whole fit and by bench_recovery.
+#pragma once
+
+#include <filesystem>
+
+#include "patina/inverse/fit.h"
+
+namespace patina::test {
+
+struct RecoveryOptions {
+  int resolution = 256;           // pixels a side of each of nine views
+  int samples_per_pixel = 256;    // of the path-traced targets
+  bool flatten_metallic = false;  // whether metallic starts at its mean too
+  inverse::FitOptions fit;
+};
+
+struct Recovery {
+  asset::Asset asset;
+  std::vector<asset::MaterialMaps> truth, start;
+  views::ViewSet views;        // rendered with the true maps by the path tracer
+  std::vector<Image> targets;  // sRGB
+  inverse::FitResult fit;
+  double target_seconds = 0, fit_seconds = 0;
+};
+Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions& options,
+                 const Progress& progress = {});
+
+/// How near maps are to the truth, over base-colour texels with evidence of the first material that has any.
+struct MapErrors {
+  double base_color_psnr = 0;  // dB, sRGB-encoded values, peak 1
+  double roughness_mae = 0;
+  double metallic_mae = 0;
+  double normal_degrees = 0;  // mean angle
+  double seen_share = 0;      // of all texels
+};
+MapErrors map_errors(const Recovery& recovery, const std::vector<asset::MaterialMaps>& maps);
+
+/// True, starting and recovered views side by side, and the same of one map's texels as they are shown.
+Image view_strip(const Recovery& recovery, size_t view, int samples_per_pixel);
+Image texture_strip(const Recovery& recovery, int slot, int size);
+
+}  // namespace patina::test
