@@ -69,7 +69,12 @@ std::string number(double value) {
   if (size < 1e-4 || size >= 1e7) return fmt::format("{:.2e}", value);
   // Enough decimals for three significant digits, at most five, none from 100 on.
   const int decimals = std::max(0, 2 - static_cast<int>(std::floor(std::log10(size))));
-  return fmt::format("{:.{}f}", value, std::min(decimals, 5));
+  std::string text = fmt::format("{:.{}f}", value, std::min(decimals, 5));
+  if (size < 1) {  // 0.430 promises more than was measured
+    while (text.back() == '0') text.pop_back();
+    if (text.back() == '.') text.pop_back();
+  }
+  return text;
 }
 
 std::string duration(double seconds) {

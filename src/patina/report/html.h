@@ -18,8 +18,8 @@ std::string escaped_lines(std::string_view text);
 /// "data:<mime>;base64,..." [RFC 2397, RFC 4648 Sec. 4].
 std::string data_uri(std::span<const uint8_t> bytes, std::string_view mime);
 
-/// `value` with about three significant digits and no exponent between 1e-4 and 1e7; "n/a" for NaN, "∞" for
-/// infinity.
+/// `value` with about three significant digits, without trailing zeros below one, and no exponent between
+/// 1e-4 and 1e7; "n/a" for NaN, "∞" for infinity.
 std::string number(double value);
 
 /// "42 s", "3 min 05 s", "1 h 02 min".

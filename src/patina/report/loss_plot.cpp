@@ -47,7 +47,7 @@ std::vector<double> ticks(const Axis& axis, int parts) {
     return out;
   }
   const double step = round_step(axis.high - axis.low, parts);
-  for (double i = std::ceil(axis.low / step - 1e-6); i * step <= axis.high + 1e-6 * step; ++i)
+  for (double i = std::ceil(axis.low / step - 1e-6) + 0.0; i * step <= axis.high + 1e-6 * step; ++i)
     out.push_back(i * step);
   return out;
 }

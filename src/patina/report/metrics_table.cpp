@@ -173,7 +173,7 @@ std::string metrics_table(const json& metrics) {
     if (!metrics.contains(pointer) || !metrics[pointer].is_number()) continue;
     const double value = metrics[pointer].get<double>();
     rows += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td>{}<small>{}</small></td><td "
+        "<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td>{}<small>good: {}</small></td><td "
         "class=\"meaning\">{}</td></tr>\n",
         measure.name, with_unit(value, measure.unit), verdict(measure, value), measure.target,
         measure.meaning);
@@ -182,7 +182,7 @@ std::string metrics_table(const json& metrics) {
   if (rows.empty()) return "";
   return "<table class=\"metrics\"><thead><tr><th scope=\"col\">Measure</th><th scope=\"col\" "
          "class=\"value\">Value</th>"
-         "<th scope=\"col\">Good is</th><th scope=\"col\">What it says</th></tr></thead>\n<tbody>\n" +
+         "<th scope=\"col\">Verdict</th><th scope=\"col\">What it says</th></tr></thead>\n<tbody>\n" +
          rows + "</tbody></table>\n";
 }
 

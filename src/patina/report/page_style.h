@@ -30,7 +30,7 @@ figure { margin:0; } figcaption, small { color:var(--quiet); font-size:.8125rem;
 .warnings { margin:2rem 0 0; padding:1rem 1.25rem; border-left:3px solid var(--copper); background:var(--raised); border-radius:0 3px 3px 0; }
 .warnings h2 { margin:0; font:600 .9375rem/1.4 var(--sans); color:var(--copper); }
 .warnings ul { margin:.4rem 0 0; padding-left:1.1rem; } .warnings li { margin:.2rem 0; overflow-wrap:anywhere; }
-.turntable { margin-top:2.5rem; max-width:56rem; } .turntable figcaption { display:flex; } .turntable figcaption span { flex:1; }
+.turntable { margin-top:2.5rem; max-width:48rem; } .turntable figcaption { display:flex; } .turntable figcaption span { flex:1; }
 
 .choice { position:absolute; opacity:0; pointer-events:none; }
 .tabs { display:inline-flex; flex-wrap:wrap; gap:2px; margin-bottom:1rem; padding:3px; background:var(--raised); border-radius:8px; }
@@ -80,10 +80,11 @@ footer { margin-top:3rem; color:var(--quiet); font-size:.8125rem; }
 @media (max-width:40rem) { .sheet { grid-template-columns:repeat(min(2,var(--columns)),minmax(0,1fr)); }
   #c-side:checked~.sheet .view, .heads { grid-template-columns:1.1rem repeat(var(--kinds),minmax(0,1fr)); gap:.35rem; } }
 @media print {
-  @page { margin:16mm; } html { font-size:10.5pt; } body { max-width:none; padding:0; } .tabs, .cut { display:none !important; }
-  figure, tr, .plot, .warnings { break-inside:avoid; } h2, h3, .heads { break-after:avoid; }
-  .heads, .sheet .view { display:grid; grid-template-columns:1.5rem repeat(var(--kinds),minmax(0,1fr)); gap:.5rem; }
-  .sheet { grid-template-columns:minmax(0,1fr); } .sheet figcaption { order:0; } .sheet figcaption span { display:none; }
+  @page { margin:16mm; } :root { --ground:#fff; } html { font-size:10.5pt; } body { max-width:none; padding:0; } .tabs, .cut { display:none !important; }
+  figure, tr, .plot, .warnings { break-inside:avoid; } h2, h3, .lead, .heads { break-after:avoid; }
+  .heads, .sheet { max-width:88%; } #c-side~.sheet { grid-template-columns:minmax(0,1fr); }
+  #c-side~.heads, #c-side~.sheet .view { display:grid; grid-template-columns:1.5rem repeat(var(--kinds),minmax(0,1fr)); gap:.5rem; }
+  #c-side~.sheet figcaption { order:0; padding:0; } #c-side~.sheet figcaption span { display:none; }
   * { print-color-adjust:exact; -webkit-print-color-adjust:exact; }
 }
 )css";

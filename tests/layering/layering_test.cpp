@@ -1,0 +1,146 @@
+// The rule of docs/architecture.md about who may include whom, checked on every source file.
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "patina/base/files.h"
+
+namespace patina {
+namespace {
+
+namespace fs = std::filesystem;
+using Folders = std::set<std::string>;
+
+// What each folder stands on directly; what those stand on is allowed too.
+const std::map<std::string, Folders> kStandsOn{
+    {"base", {}},
+    {"image", {"base"}},
+    {"asset", {"image"}},
+    {"render", {"asset"}},
+    {"views", {"render"}},
+    {"attention", {"base"}},
+    {"correspond", {"views", "attention"}},
+    {"nn", {"attention"}},
+    {"diffusion", {"nn", "image"}},
+    {"inverse", {"views"}},
+    {"report", {"inverse", "correspond"}},
+    {"pipeline", {"report", "diffusion", "inverse", "correspond"}},
+};
+
+Folders reachable(const std::string& folder) {
+  Folders out{folder};
+  for (const std::string& below : kStandsOn.at(folder)) out.merge(reachable(below));
+  return out;
+}
+
+// Third-party headers that only some folders may see, by how their names begin.
+struct Restricted {
+  std::string prefix;
+  Folders folders;
+};
+const std::vector<Restricted> kRestricted{
+    {"torch/", {"nn", "diffusion"}},
+    {"ATen/", {"nn", "diffusion"}},
+    {"c10/", {"nn", "diffusion"}},
+    {"embree3/", {"render"}},
+    {"OpenImageIO/", {"image"}},
+    {"webp/", {"report"}},
+    {"tbb/", {"base"}},
+    {"cuda", {"attention", "nn"}},
+};
+
+struct Include {
+  fs::path file;
+  int line;
+  std::string name;  // between the quotes or brackets
+};
+
+std::vector<Include> includes_of(const fs::path& root) {
+  std::vector<Include> out;
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    const fs::path& path = entry.path();
+    if (path.extension() != ".h" && path.extension() != ".cpp" && path.extension() != ".cu" &&
+        path.extension() != ".cuh")
+      continue;
+    std::istringstream text(read_text_file(path));
+    std::string line;
+    for (int number = 1; std::getline(text, line); ++number) {
+      const size_t hash = line.find_first_not_of(" \t");
+      if (hash == std::string::npos || line[hash] != '#') continue;
+      const size_t word = line.find_first_not_of(" \t", hash + 1);
+      if (word == std::string::npos || line.compare(word, 7, "include") != 0) continue;
+      const size_t begin = line.find_first_of("\"<", word);
+      const size_t end = begin == std::string::npos ? begin : line.find_first_of("\">", begin + 1);
+      if (end != std::string::npos) out.push_back({path, number, line.substr(begin + 1, end - begin - 1)});
+    }
+  }
+  return out;
+}
+
+const fs::path kRoot = PATINA_SOURCE_DIR;
+
+std::string first_folder(const fs::path& path) {
+  return path.begin()->string();
+}
+
+TEST(Layering, covers_every_folder) {
+  for (const auto& entry : fs::directory_iterator(kRoot / "src" / "patina"))
+    if (entry.is_directory()) {
+      EXPECT_TRUE(kStandsOn.count(entry.path().filename().string())) << entry.path() << " has no rule";
+    }
+}
+
+TEST(Layering, folders_include_only_what_they_stand_on) {
+  const fs::path library = kRoot / "src" / "patina";
+  int num_checked = 0;
+  for (const Include& include : includes_of(library)) {
+    const std::string from = first_folder(fs::relative(include.file, library));
+    if (include.name.rfind("patina/", 0) != 0) continue;
+    const std::string to = first_folder(fs::path(include.name.substr(7)));
+    EXPECT_TRUE(reachable(from).count(to)) << include.file.string() << ':' << include.line << " includes "
+                                           << include.name << ", but " << from << " may not stand on " << to;
+    ++num_checked;
+  }
+  EXPECT_GT(num_checked, 100) << "the scan found too little to mean anything";
+}
+
+TEST(Layering, third_party_headers_stay_in_their_folders) {
+  const fs::path library = kRoot / "src" / "patina";
+  for (const Include& include : includes_of(library)) {
+    const std::string from = first_folder(fs::relative(include.file, library));
+    for (const Restricted& rule : kRestricted)
+      if (include.name.rfind(rule.prefix, 0) == 0) {
+        EXPECT_TRUE(rule.folders.count(from))
+            << include.file.string() << ':' << include.line << " includes " << include.name;
+      }
+  }
+}
+
+TEST(Layering, includes_inside_the_library_name_the_whole_path) {
+  for (const Include& include : includes_of(kRoot / "src" / "patina"))
+    EXPECT_FALSE(include.name.rfind("../", 0) == 0) << include.file.string() << ':' << include.line;
+}
+
+// The command line turns flags into configuration and makes one call: neither networks nor ray casting show
+// there.
+TEST(Layering, applications_see_no_third_party_engine) {
+  for (const Include& include : includes_of(kRoot / "apps" / "patina"))
+    for (const char* prefix : {"torch/", "ATen/", "c10/", "embree3/", "OpenImageIO/", "webp/"})
+      EXPECT_FALSE(include.name.rfind(prefix, 0) == 0)
+          << include.file.string() << ':' << include.line << " includes " << include.name;
+}
+
+TEST(Layering, the_rule_has_no_circles) {
+  for (const auto& [folder, below] : kStandsOn)
+    for (const std::string& other : below)
+      EXPECT_FALSE(reachable(other).count(folder)) << folder << " and " << other;
+}
+
+}  // namespace
+}  // namespace patina
