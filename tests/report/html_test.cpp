@@ -37,6 +37,9 @@ TEST(Number, has_three_significant_digits) {
   EXPECT_EQ(number(0), "0");
   EXPECT_EQ(number(1), "1.00");
   EXPECT_EQ(number(27.456), "27.5");
+  EXPECT_EQ(number(0.43), "0.43");
+  EXPECT_EQ(number(0.004), "0.004");
+  EXPECT_EQ(number(0.9999), "1");
   EXPECT_EQ(number(-0.012345), "-0.0123");
   EXPECT_EQ(number(4321.9), "4322");
   EXPECT_EQ(number(3e-9), "3.00e-09");

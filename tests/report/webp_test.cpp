@@ -1,5 +1,4 @@
 #include <webp/decode.h>
-#include <webp/demux.h>
 
 #include <algorithm>
 #include <memory>
@@ -12,42 +11,14 @@
 #include "patina/report/report.h"
 #include "patina/report/webp.h"
 #include "pictures.h"
+#include "webp_decoding.h"
 
 namespace patina::report {
 namespace {
 
-Image from_rgba(const uint8_t* rgba, int width, int height) {
-  Image image(width, height, 3);
-  for (size_t i = 0; i < image.num_pixels(); ++i)
-    for (size_t c = 0; c < 3; ++c) image.pixels[3 * i + c] = static_cast<float>(rgba[4 * i + c]) / 255.0f;
-  return image;
-}
-
-struct Decoded {
-  std::vector<Image> frames;
-  std::vector<int> end_milliseconds;
-  uint32_t loop_count = 1;
-};
-
-Decoded decode_animation(const std::vector<uint8_t>& bytes) {
-  const WebPData data{bytes.data(), bytes.size()};
-  const std::unique_ptr<WebPAnimDecoder, void (*)(WebPAnimDecoder*)> decoder(
-      WebPAnimDecoderNew(&data, nullptr), WebPAnimDecoderDelete);
-  WebPAnimInfo info;
-  if (!decoder || !WebPAnimDecoderGetInfo(decoder.get(), &info))
-    throw std::runtime_error("not an animated WebP");
-  Decoded out;
-  out.loop_count = info.loop_count;
-  while (WebPAnimDecoderHasMoreFrames(decoder.get())) {
-    uint8_t* rgba = nullptr;
-    int end = 0;
-    if (!WebPAnimDecoderGetNext(decoder.get(), &rgba, &end)) throw std::runtime_error("a frame is broken");
-    out.frames.push_back(
-        from_rgba(rgba, static_cast<int>(info.canvas_width), static_cast<int>(info.canvas_height)));
-    out.end_milliseconds.push_back(end);
-  }
-  return out;
-}
+using test::decode_animation;
+using test::DecodedAnimation;
+using test::from_rgba;
 
 TEST(WebP, a_still_decodes_to_nearly_the_same_picture) {
   const Image image = test::wave_picture(75, 41, 0.4f);
@@ -80,7 +51,7 @@ TEST(Animation, decodes_to_the_frames_that_went_in) {
   for (int i = 0; i < 7; ++i) frames.push_back(test::wave_picture(80, 48, 0.8f * static_cast<float>(i)));
   write_animation(folder.path() / "a.webp", frames, 2.0f);
 
-  const Decoded decoded = decode_animation(read_file(folder.path() / "a.webp"));
+  const DecodedAnimation decoded = decode_animation(read_file(folder.path() / "a.webp"));
   ASSERT_EQ(decoded.frames.size(), frames.size());
   EXPECT_EQ(decoded.loop_count, 0u) << "endless";
   EXPECT_EQ(decoded.end_milliseconds.back(), 2000);
