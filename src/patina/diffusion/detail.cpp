@@ -79,6 +79,7 @@ Sizes checked_sizes(const Model& model, const DetailInputs& inputs, const Detail
   }
   check_views(inputs.tile_views, "tile views", sizes);
   check_views(inputs.normal_views, "normal views", sizes);
+  if (!inputs.start_views.empty()) check_views(inputs.start_views, "start views", sizes);
   const int64_t noise_size =
       model.latent_channels() * sizes.grid * sizes.grid * sizes.latent_height * sizes.latent_width;
   if (static_cast<int64_t>(inputs.noise.size()) != noise_size) {
@@ -220,9 +221,11 @@ std::vector<Image> generate_detail(const Model& model, const DetailInputs& input
                   "belongs to a run with other sizes or steps; start the stage again");
     }
   } else {
+    const std::vector<Image>& start_views =
+        inputs.start_views.empty() ? inputs.tile_views : inputs.start_views;
     state.next_call = start;
-    state.latents = add_noise(
-        plan, start, start_latents(networks.vae, inputs.tile_views, sizes.grid, progress), inputs.noise);
+    state.latents =
+        add_noise(plan, start, start_latents(networks.vae, start_views, sizes.grid, progress), inputs.noise);
   }
 
   const auto report = [&](int next_call) {

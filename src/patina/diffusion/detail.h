@@ -1,4 +1,5 @@
-// The diffusion model as the rest of patina sees it: a folder of weights in, edited views out. No Torch type passes this header.
+// The diffusion model as the rest of patina sees it: a folder of weights in, edited views out. No Torch type
+// passes this header.
 #pragma once
 
 #include <cstdint>
@@ -19,37 +20,39 @@ namespace patina::diffusion {
 
 enum class Scheduler { kDdim, kPndm, kEuler, kEulerAncestral, kDpmSolverPp2m, kDpmSolverPp2mKarras, kUniPc };
 enum class Dtype { kAuto, kF32, kBf16 };
-enum class BiasScaling { kPaper, kAdditive };   // β = w/√d or β = w
+enum class BiasScaling { kPaper, kAdditive };  // β = w/√d or β = w
 
 /// Where the components of a model lie; an empty path takes the component from `model`.
 struct ModelPaths {
-  std::filesystem::path model;                // a diffusers folder
+  std::filesystem::path model;  // a diffusers folder
   std::filesystem::path vae;
-  std::filesystem::path controlnet_tile;      // default: <model>/controlnet_tile
-  std::filesystem::path controlnet_normal;    // default: <model>/controlnet_normal
+  std::filesystem::path controlnet_tile;    // default: <model>/controlnet_tile
+  std::filesystem::path controlnet_normal;  // default: <model>/controlnet_normal
 };
 
 struct ModelOptions {
   Dtype dtype = Dtype::kAuto;
-  int num_threads = 0;                        // 0: all processors
+  int num_threads = 0;  // 0: all processors
 };
 
-/// Looks at the folders and weight files of a model without loading it. Throws Error that names what is missing, broken or a pickle.
+/// Looks at the folders and weight files of a model without loading it. Throws Error that names what is
+/// missing, broken or a pickle.
 void check_model(const ModelPaths& paths);
 
 /// A loaded model: weights are memory-mapped. Opaque; move-only.
 class Model {
  public:
-  /// Throws Error that names the file and tensor: missing, wrongly shaped (expected and found), malformed, a pickle.
+  /// Throws Error that names the file and tensor: missing, wrongly shaped (expected and found), malformed, a
+  /// pickle.
   Model(const ModelPaths& paths, const ModelOptions& options);
   ~Model();
   Model(Model&&) noexcept;
   Model& operator=(Model&&) noexcept;
 
-  int latent_scale() const;                   // image pixels a latent pixel, from the VAE's config
+  int latent_scale() const;  // image pixels a latent pixel, from the VAE's config
   int latent_channels() const;
-  Dtype dtype() const;                        // what kAuto became
-  std::string description() const;            // family, parameters, precision: one line for logs and config.json
+  Dtype dtype() const;              // what kAuto became
+  std::string description() const;  // family, parameters, precision: one line for logs and config.json
 
   struct State;
   const State& state() const { return *state_; }
@@ -59,23 +62,25 @@ class Model {
 };
 
 struct DetailInputs {
-  int grid = 1;                               // views a side
-  std::vector<Image> tile_views;              // grid² × [H,W,3] sRGB [0,1]: start image and tile condition
-  std::vector<Image> normal_views;            // grid² × [H,W,3] [0,1]
-  std::vector<float> noise;                   // [C, grid·H/scale, grid·W/scale] f32, unit variance
+  int grid = 1;                     // views a side
+  std::vector<Image> tile_views;    // grid² × [H,W,3] sRGB [0,1]: tile condition and start image
+  std::vector<Image> normal_views;  // grid² × [H,W,3] [0,1]
+  std::vector<float> noise;         // [C, grid·H/scale, grid·W/scale] f32, unit variance
   std::vector<attention::KeyBuckets> bias_levels;  // finest first; empty: no bias
+  std::vector<Image> start_views;  // grid² × [H,W,3] sRGB [0,1]: start image where it is not the tile
+                                   // condition; empty: tile_views
 };
 
 struct DetailOptions {
   std::string prompt, negative_prompt;
   int num_steps = 20;
-  float guidance_scale = 7.5f;                // 1: no guidance, one evaluation a step
-  float strength = 0.8f;                      // (0,1]: share of the steps that is run [Meng2022]
+  float guidance_scale = 7.5f;  // 1: no guidance, one evaluation a step
+  float strength = 0.8f;        // (0,1]: share of the steps that is run [Meng2022]
   float tile_scale = 1.0f, normal_scale = 1.0f;
   Scheduler scheduler = Scheduler::kUniPc;
-  float bias_weight = 0;                      // w; 0: no bias
+  float bias_weight = 0;  // w; 0: no bias
   BiasScaling bias_scaling = BiasScaling::kPaper;
-  uint64_t seed = 0;                          // of the noise that ancestral schedulers draw
+  uint64_t seed = 0;  // of the noise that ancestral schedulers draw
 };
 
 /// Where a run stands between two steps, as bytes that restore it exactly; for resuming a killed run.
@@ -84,13 +89,14 @@ struct Checkpoint {
   std::vector<uint8_t> bytes;
 };
 struct DetailHooks {
-  std::function<void(const Checkpoint&)> on_checkpoint;   // after every step; may be empty
-  std::optional<Checkpoint> resume;                       // from an earlier call with equal inputs and options
+  std::function<void(const Checkpoint&)> on_checkpoint;  // after every step; may be empty
+  std::optional<Checkpoint> resume;                      // from an earlier call with equal inputs and options
 };
 
-/// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4]. Encodes and decodes view by view.
-/// Returns grid² sRGB images [H,W,3] in [0,1]. Throws Error{kUsage} if sizes do not fit.
-std::vector<Image> generate_detail(const Model& model, const DetailInputs& inputs, const DetailOptions& options,
-                                   const DetailHooks& hooks, const Progress& progress);
+/// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4]. Encodes and decodes
+/// view by view. Returns grid² sRGB images [H,W,3] in [0,1]. Throws Error{kUsage} if sizes do not fit.
+std::vector<Image> generate_detail(const Model& model, const DetailInputs& inputs,
+                                   const DetailOptions& options, const DetailHooks& hooks,
+                                   const Progress& progress);
 
 }  // namespace patina::diffusion
