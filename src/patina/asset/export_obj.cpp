@@ -157,8 +157,8 @@ class GlbBuilder {
   }
   // A texture with PNG `image`; its index.
   size_t add_texture(const Image& image, const std::string& name, const TextureRef& ref) {
-    root_["images"].push_back(
-        {{"bufferView", add_bytes(encode_png(image))}, {"mimeType", "image/png"}, {"name", name}});
+    const size_t view = add_bytes(encode_png(image));
+    root_["images"].push_back({{"bufferView", view}, {"mimeType", "image/png"}, {"name", name}});
     root_["textures"].push_back({{"source", root_["images"].size() - 1}});
     if (ref.wrap_s == Wrap::kClampToEdge) {
       root_["samplers"].push_back({{"wrapS", 33071}, {"wrapT", 33071}});
@@ -289,12 +289,14 @@ void export_obj(const ExportRequest& request) {
 
 void export_obj_as_glb(const ExportRequest& request) {
   GlbBuilder builder;
-  Json& root = builder.root();
+  Json& root = builder.root();  // its members lie in a vector: no reference to one survives an insertion
   root["scenes"] = Json::array({Json{{"nodes", {0}}}});
   root["nodes"] = Json::array({Json{{"mesh", 0}, {"name", request.asset.path.stem().string()}}});
   root["bufferViews"] = root["accessors"] = root["materials"] = Json::array();
-  for (size_t i = 0; i < request.asset.materials.size(); ++i)
-    root["materials"].push_back(material_json(request, i, builder));
+  for (size_t i = 0; i < request.asset.materials.size(); ++i) {
+    Json material = material_json(request, i, builder);
+    root["materials"].push_back(std::move(material));
+  }
   Json primitives = Json::array();
   for (const Primitive& p : request.asset.primitives)
     if (!p.triangles.empty()) primitives.push_back(primitive_json(p, builder));
