@@ -36,12 +36,9 @@ inline Vec8 fma(Vec8 a, Vec8 b, Vec8 c) {
 inline Vec8 max_keeping_nan(Vec8 a, Vec8 b) {
   return {_mm256_max_ps(a.v, b.v)};
 }
-inline Vec8 round_to_int(Vec8 x) {
-  return {_mm256_round_ps(x.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)};
-}
-inline Vec8 power_of_two(Vec8 n) {
-  return {_mm256_castsi256_ps(
-      _mm256_slli_epi32(_mm256_add_epi32(_mm256_cvtps_epi32(n.v), _mm256_set1_epi32(127)), 23))};
+/// The float whose exponent is the lowest eight bits of x and whose other bits are zero.
+inline Vec8 from_lowest_bits(Vec8 x) {
+  return {_mm256_castsi256_ps(_mm256_slli_epi32(_mm256_castps_si256(x.v), 23))};
 }
 inline void add_in_lanes(float* row, Vec8 value, uint64_t lanes) {
   const __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);

@@ -37,13 +37,9 @@ inline Vec4 fma(Vec4 a, Vec4 b, Vec4 c) {
 inline Vec4 max_keeping_nan(Vec4 a, Vec4 b) {
   return {a.v > b.v ? a.v : b.v};
 }
-/// Adding 1.5 · 2²³ leaves no fraction bits; right for |x| < 2²².
-inline Vec4 round_to_int(Vec4 x) {
-  Floats shifted = x.v + 12582912.0f;
-  return {shifted - 12582912.0f};
-}
-inline Vec4 power_of_two(Vec4 n) {
-  return {reinterpret_cast<Floats>((__builtin_convertvector(n.v, Ints) + 127) << 23)};
+/// The float whose exponent is the lowest eight bits of x and whose other bits are zero.
+inline Vec4 from_lowest_bits(Vec4 x) {
+  return {reinterpret_cast<Floats>(reinterpret_cast<Ints>(x.v) << 23)};
 }
 inline void add_in_lanes(float* row, Vec4 value, uint64_t lanes) {
   for (int i = 0; i < 4; ++i)

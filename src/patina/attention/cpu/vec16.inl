@@ -28,12 +28,9 @@ inline Vec16 fma(Vec16 a, Vec16 b, Vec16 c) {
 inline Vec16 max_keeping_nan(Vec16 a, Vec16 b) {
   return {_mm512_max_ps(a.v, b.v)};
 }
-inline Vec16 round_to_int(Vec16 x) {
-  return {_mm512_roundscale_ps(x.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)};
-}
-inline Vec16 power_of_two(Vec16 n) {
-  return {_mm512_castsi512_ps(
-      _mm512_slli_epi32(_mm512_add_epi32(_mm512_cvtps_epi32(n.v), _mm512_set1_epi32(127)), 23))};
+/// The float whose exponent is the lowest eight bits of x and whose other bits are zero.
+inline Vec16 from_lowest_bits(Vec16 x) {
+  return {_mm512_castsi512_ps(_mm512_slli_epi32(_mm512_castps_si512(x.v), 23))};
 }
 inline void add_in_lanes(float* row, Vec16 value, uint64_t lanes) {
   const __m512 old = _mm512_load_ps(row);
