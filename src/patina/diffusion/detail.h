@@ -67,7 +67,7 @@ struct DetailInputs {
   std::vector<Image> normal_views;  // grid² × [H,W,3] [0,1]
   std::vector<float> noise;         // [C, grid·H/scale, grid·W/scale] f32, unit variance
   std::vector<attention::KeyBuckets> bias_levels;  // finest first; empty: no bias
-  std::vector<Image> start_views;  // grid² × [H,W,3] sRGB [0,1]: start image where it is not the tile
+  std::vector<Image> start_views = {};  // grid² × [H,W,3] sRGB [0,1]: start image where it is not the tile
                                    // condition; empty: tile_views
 };
 

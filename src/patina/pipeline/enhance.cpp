@@ -1,8 +1,11 @@
 #include "patina/pipeline/enhance.h"
 
+#include <unistd.h>
+
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "patina/base/files.h"
 #include "patina/pipeline/options.h"
 
 namespace patina::pipeline {
@@ -11,6 +14,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 void enhance(const Config& config, RunFolder& run, const Progress& progress) {
+  check_inputs(config);
   write_config(config, run);
   const Workbench bench = open_workbench(config, progress);                // asset, scene, cameras
   const RenderedViews views = render_stage(bench, config, run, progress);  // → views/
@@ -18,6 +22,26 @@ void enhance(const Config& config, RunFolder& run, const Progress& progress) {
   const FittedMaterials fitted = fit_stage(bench, views, edited, config, run, progress);  // → textures/
   write_output(bench, fitted, config);                                                    // → the asset
   report_stage(bench, views, edited, fitted, config, run, progress);                      // → report.html
+}
+
+void check_inputs(const Config& config) {
+  if (config.model.model.empty())
+    throw Error(ErrorCode::kUsage, "--model",
+                "give a diffusion model: a folder in the diffusers layout, such as Stable Diffusion 1.5 with "
+                "the tile and "
+                "normalbae ControlNets in controlnet_tile/ and controlnet_normal/");
+  diffusion::check_model(config.model);
+  if (config.output.empty()) return;
+  const std::string extension = config.output.extension().string();
+  if (extension != ".glb" && extension != ".gltf" && extension != ".obj")
+    throw Error(ErrorCode::kUsage, "--output",
+                fmt::format("expected a name that ends in .glb, .gltf or .obj, found '{}'",
+                            printable(config.output.string())));
+  // A file that is made and removed beside the output tells whether the output can be written.
+  const fs::path probe = config.output.parent_path() / fmt::format(".patina-probe.{}", ::getpid());
+  write_file(probe, std::string_view());
+  std::error_code ignored;
+  fs::remove(probe, ignored);
 }
 
 void write_output(const Workbench& bench, const FittedMaterials& fitted, const Config& config) {
