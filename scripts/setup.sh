@@ -13,7 +13,7 @@ packages=(
   nlohmann-json3-dev libglm-dev libcli11-dev libspdlog-dev libxxhash-dev
   libgtest-dev libbenchmark-dev
 )
-if [[ "${1:-}" == "--bench" ]]; then packages+=(blender); fi
+if [[ "${1:-}" == "--bench" ]]; then packages+=(blender python3-numpy); fi
 
 missing=()
 for package in "${packages[@]}"; do

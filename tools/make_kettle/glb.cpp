@@ -61,8 +61,8 @@ struct Mesh {
   std::vector<uint16_t> indices;
 };
 
-// Rounded to a nanometre or so, far below anything visible, so that the last bits of sines leave no trace in
-// the file.
+// Rounded to 2^-24 (60 nm), far below anything visible, so that the last bits of sines leave no trace in the
+// file.
 float rounded(double value) {
   return static_cast<float>(std::round(value * 0x1p24) * 0x1p-24);
 }

@@ -41,8 +41,8 @@ struct Parameter {
 };
 Parameter parameter_at(const Patch& patch, const dvec2& uv);
 
-/// The surface with unit normal and with the directions in which the island's u and v grow (v points down in
-/// the image).
+/// The surface point, its unit normal, and the unit direction in which the island's u grows (the glTF
+/// tangent).
 struct Frame {
   dvec3 position, normal, along_u;
 };

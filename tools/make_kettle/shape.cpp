@@ -111,11 +111,11 @@ Patch swept(const Tube& tube) {
     return glm::mix((*begin)[i % kTable], (*begin)[(i + 1) % kTable], x - std::floor(x));
   };
 
-  double around = 0, shortest = 1;
+  double around = 0, earliest = 1;
   for (int i = 0; i <= 16; ++i) {
     const dvec2 r = tube.radius(i / 16.0);
     around += kTwoPi * std::sqrt(0.5 * glm::dot(r, r)) / 17;
-    shortest = std::min(shortest, begin_at(i / 16.0));
+    earliest = std::min(earliest, begin_at(i / 16.0));
   }
   Patch patch;
   patch.name = tube.name;
@@ -125,7 +125,7 @@ Patch swept(const Tube& tube) {
   patch.steps_s = tube.steps_s;
   patch.steps_t = tube.steps_t;
   patch.width = around;
-  patch.height = curve->length() * (1 - shortest);
+  patch.height = curve->length() * (1 - earliest);
   return patch;
 }
 

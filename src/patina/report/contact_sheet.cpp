@@ -1,3 +1,4 @@
+// Pictures side by side on one neutral sheet.
 #include <algorithm>
 #include <cmath>
 

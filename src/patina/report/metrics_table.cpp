@@ -39,9 +39,9 @@ constexpr std::array kMeasures{
     Measure{"/coverage",
             "Surface seen",
             Unit::kShare,
-            {0.95, 1},
-            {0.8, 1},
-            "95 % or more",
+            {0.9, 1},
+            {0.7, 1},
+            "90 % or more",
             "Share of the surface that at least one view sees. What no view sees cannot be enhanced and "
             "keeps its old texture."},
     Measure{

@@ -137,7 +137,7 @@ std::string views(const ReportData& data) {
   html += "</div>\n";
   if (can_wipe)
     html +=
-        "<label class=\"cut\">Before <input type=\"range\" min=\"0\" max=\"100\" value=\"50\" "
+        "<label class=\"cut\">Before <input type=\"range\" min=\"0\" max=\"100\" step=\"any\" value=\"50\" "
         "aria-label=\"Where after begins\"> After</label>\n";
   html += "<div class=\"heads\"><span></span>";
   for (const Kind& kind : kinds) html += fmt::format("<span>{}</span>", kind.label);

@@ -1,3 +1,4 @@
+// One turn around the asset, before and after side by side, through the path tracer.
 #include <algorithm>
 #include <cmath>
 #include <limits>
