@@ -8,6 +8,7 @@ times their difference), the EXR files, and OUT/cycles.json with the numbers tha
 """
 import argparse
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -22,7 +23,9 @@ DEPTH = "9"  # segments after the camera ray: Cycles counts bounces (8), the las
 
 
 def run(command):
-    result = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+    # Debian's Blender looks for its Python along PATH: one of the user's own, without numpy, must not come first.
+    environment = {**os.environ, "PATH": "/usr/bin:/bin:" + os.environ.get("PATH", "")}
+    result = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=environment)
     if result.returncode != 0:
         sys.exit(f"{command[0]} failed:\n{result.stdout[-2000:]}\n{result.stderr[-2000:]}")
     return result.stdout
@@ -46,10 +49,10 @@ def main():
     for name, (path, eye, target) in VIEWS.items():
         cycles = out / f"cycles_{name}_cycles.exr"
         script = pathlib.Path(__file__).with_name("cycles_view.py")
-        run(["blender", "-b", "--factory-startup", "-P", script, "--", assets / path, hdr, cycles, arguments.size,
+        log = run(["blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", script, "--", assets / path, hdr, cycles, arguments.size,
              arguments.samples, FOV_DEGREES, *eye, *target])
         if not cycles.exists():
-            sys.exit(f"Blender wrote no {cycles}")
+            sys.exit(f"Blender wrote no {cycles}:\n{log[-2000:]}")
         for model in ("gltf", "principled"):
             picture = [] if model != "gltf" else ["--picture", out / f"cycles_{name}.png"]
             numbers = out / f"cycles_{name}_{model}.json"

@@ -12,30 +12,34 @@
 namespace patina::render {
 namespace {
 
-constexpr int kMaxPassed = 8;  // remembered triangles that a ray went through at its present distance
+constexpr int kMaxPassed = 8;  // remembered layers that a ray went through near its present distance
 constexpr int kMaxAlphaLayers =
     256;  // blended layers that a ray may pass before it gives up and counts as a miss
+constexpr float kSameLayer =
+    0x1p-21f;  // relative distance within which two hits of a primitive are one layer
 
 /// What Embree hands to the filter: its own context first, as the library demands.
 struct AlphaContext {
   RTCIntersectContext embree;
-  uint32_t passed_geometry[kMaxPassed], passed_triangle[kMaxPassed];
+  uint32_t passed_geometry[kMaxPassed];
+  float passed_t[kMaxPassed];
   int num_passed = 0;  // counts on, the arrays are a ring
 
-  void pass(uint32_t geometry, uint32_t triangle) {
+  void pass(uint32_t geometry, float t) {
     passed_geometry[num_passed % kMaxPassed] = geometry;
-    passed_triangle[num_passed % kMaxPassed] = triangle;
+    passed_t[num_passed % kMaxPassed] = t;
     ++num_passed;
   }
-  bool has_passed(uint32_t geometry, uint32_t triangle) const {
+  /// Also true for a neighbouring triangle that is met on the shared edge: that is still the same layer.
+  bool has_passed(uint32_t geometry, float t) const {
     for (int i = 0; i < std::min(num_passed, kMaxPassed); ++i)
-      if (passed_geometry[i] == geometry && passed_triangle[i] == triangle) return true;
+      if (passed_geometry[i] == geometry && std::abs(passed_t[i] - t) <= kSameLayer * t) return true;
     return false;
   }
 };
 
-/// Called for single rays only (N = 1). Rejects holes of masked materials, and triangles that a ray which
-/// goes on through blended layers has met already.
+/// Called for single rays only (N = 1). Rejects holes of masked materials, and blended layers that the ray has
+/// passed already.
 void alpha_filter(const RTCFilterFunctionNArguments* args) {
   const auto* state = static_cast<const Scene::State*>(args->geometryUserPtr);
   const uint32_t geometry = RTCHitN_geomID(args->hit, 1, 0), triangle = RTCHitN_primID(args->hit, 1, 0);
@@ -44,7 +48,8 @@ void alpha_filter(const RTCFilterFunctionNArguments* args) {
   if (material.alpha_mode == asset::AlphaMode::kMask) {
     if (!(opacity_at(material, *state->primitives[geometry], triangle, barycentric) > 0.0f))
       args->valid[0] = 0;
-  } else if (reinterpret_cast<const AlphaContext*>(args->context)->has_passed(geometry, triangle)) {
+  } else if (reinterpret_cast<const AlphaContext*>(args->context)
+                 ->has_passed(geometry, RTCRayN_tfar(args->ray, 1, 0))) {
     args->valid[0] = 0;
   }
 }
@@ -169,7 +174,7 @@ std::optional<Hit> Scene::intersect(const Ray& ray, float u_alpha) const {
     if (u_alpha < alpha) return hit;
     // Given that u >= alpha, (u − alpha)/(1 − alpha) is uniform again: one number decides about all layers.
     u_alpha = alpha < 1.0f ? std::min((u_alpha - alpha) / (1.0f - alpha), 0x1.fffffep-1f) : 0.0f;
-    context.pass(hit.primitive, hit.triangle);
+    context.pass(hit.primitive, hit.t);
     query.ray.tnear = query.ray.tfar;
     query.ray.tfar = ray.t_max;
   }
