@@ -1,0 +1,263 @@
+// The whole way through the facade: equal to the reference's ControlNet image-to-image, resumable to the bit,
+// honest about its inputs.
+#include "patina/diffusion/detail.h"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "../support.h"
+#include "patina/base/error.h"
+#include "patina/base/random.h"
+#include "patina/nn/safetensors.h"
+
+namespace patina::diffusion {
+namespace {
+
+namespace fs = std::filesystem;
+
+const Model& tiny_model() {
+  static const Model model({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, 0});
+  return model;
+}
+
+std::vector<float> floats(const nn::SafeTensors& file, const std::string& name) {
+  const nn::TensorEntry* entry = file.find(name);
+  if (!entry) throw std::runtime_error("golden file lacks " + name);
+  std::vector<float> values(entry->bytes.size() / sizeof(float));
+  std::memcpy(values.data(), entry->bytes.data(), entry->bytes.size());
+  return values;
+}
+
+/// [1,3,H,W] -> an image.
+Image image_of(const nn::SafeTensors& file, const std::string& name) {
+  const std::vector<float> values = floats(file, name);
+  const std::vector<int64_t> shape = file.find(name)->shape;
+  Image image(static_cast<int>(shape[3]), static_cast<int>(shape[2]), 3);
+  for (size_t c = 0; c < 3; ++c) {
+    for (size_t i = 0; i < image.num_pixels(); ++i)
+      image.pixels[3 * i + c] = values[c * image.num_pixels() + i];
+  }
+  return image;
+}
+
+double max_difference(const Image& a, const Image& b) {
+  EXPECT_EQ(a.pixels.size(), b.pixels.size());
+  double difference = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) {
+    difference =
+        std::max(difference, std::abs(static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i])));
+  }
+  return difference;
+}
+
+/// Smooth views of `size`² pixels that differ from one another, and noise for them.
+DetailInputs made_inputs(int grid, int size) {
+  DetailInputs inputs;
+  inputs.grid = grid;
+  for (int v = 0; v < grid * grid; ++v) {
+    Image tile(size, size, 3), normal(size, size, 3);
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        const auto u = static_cast<float>(x) / static_cast<float>(size),
+                   w = static_cast<float>(y) / static_cast<float>(size);
+        tile.set_rgb(x, y, vec3(0.5f + 0.4f * std::sin(9 * u + static_cast<float>(v)), w, 0.3f));
+        normal.set_rgb(x, y, vec3(u, w, 0.9f));
+      }
+    }
+    inputs.tile_views.push_back(tile);
+    inputs.normal_views.push_back(normal);
+  }
+  const size_t side = static_cast<size_t>(grid) * static_cast<size_t>(size) / 8;
+  inputs.noise.resize(4 * side * side);
+  for (size_t i = 0; i < inputs.noise.size(); i += 4) {
+    const auto four = gaussian4(3, RandomPurpose::kTest, i);
+    std::copy(four.begin(), four.end(), inputs.noise.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return inputs;
+}
+
+/// Every pixel favours the pixels at its own place in the other views, at each resolution of the tiny model
+/// that has attention.
+std::vector<attention::KeyBuckets> same_place_bias(int grid, int view) {
+  std::vector<attention::KeyBuckets> levels;
+  for (const int radius : {1, 0}) {
+    attention::KeyBuckets buckets;
+    buckets.grid = grid, buckets.view_width = buckets.view_height = view, buckets.window_radius = radius;
+    buckets.offsets.push_back(0);
+    for (int y = 0; y < buckets.height(); ++y) {
+      for (int x = 0; x < buckets.width(); ++x) {
+        for (int vy = 0; vy < grid; ++vy) {
+          for (int vx = 0; vx < grid; ++vx) {
+            if (vx == x / view && vy == y / view) continue;
+            buckets.keys.push_back((vy * view + y % view) * buckets.width() + vx * view + x % view);
+          }
+        }
+        buckets.offsets.push_back(static_cast<int32_t>(buckets.keys.size()));
+      }
+    }
+    levels.push_back(buckets);
+    view /= 2;
+  }
+  return levels;
+}
+
+std::vector<Image> run(const DetailInputs& inputs, const DetailOptions& options,
+                       const DetailHooks& hooks = {}, const Progress& progress = {}) {
+  return generate_detail(tiny_model(), inputs, options, hooks, progress);
+}
+
+DetailOptions short_options(Scheduler scheduler = Scheduler::kUniPc) {
+  DetailOptions options;
+  options.prompt = "a rusty old kettle";
+  options.num_steps = 5;
+  options.strength = 0.8f;
+  options.scheduler = scheduler;
+  return options;
+}
+
+TEST(Detail, without_bias_it_is_the_reference_controlnet_image_to_image) {
+  const nn::SafeTensors golden(test::data_dir() / "golden" / "e2e_img2img_ddim6.safetensors");
+  DetailInputs inputs;
+  inputs.start_views = {image_of(golden, "init_image_01")};
+  inputs.tile_views = {image_of(golden, "cond_tile_01")};
+  inputs.normal_views = {image_of(golden, "cond_normal_01")};
+  inputs.noise = floats(golden, "noise");
+  DetailOptions options;
+  options.prompt = golden.metadata().at("prompt");
+  options.negative_prompt = golden.metadata().at("negative_prompt");
+  options.num_steps = 6;
+  options.tile_scale = 0.8f, options.normal_scale = 0.7f;
+  options.scheduler = Scheduler::kDdim;
+  const std::vector<Image> views = run(inputs, options);
+  ASSERT_EQ(views.size(), 1u);
+  EXPECT_LT(max_difference(views[0], image_of(golden, "decoded_01")), 5e-4 + 1e-4);
+}
+
+TEST(Detail, a_resumed_run_gives_the_same_bytes) {
+  const DetailInputs inputs = made_inputs(2, 64);
+  for (const Scheduler scheduler : {Scheduler::kUniPc, Scheduler::kPndm, Scheduler::kEulerAncestral}) {
+    std::vector<Checkpoint> checkpoints;
+    DetailHooks keep;
+    keep.on_checkpoint = [&](const Checkpoint& checkpoint) { checkpoints.push_back(checkpoint); };
+    const std::vector<Image> whole = run(inputs, short_options(scheduler), keep);
+    ASSERT_GE(checkpoints.size(), 4u);
+    DetailHooks resume;
+    resume.resume = checkpoints[1];
+    const std::vector<Image> resumed = run(inputs, short_options(scheduler), resume);
+    for (size_t i = 0; i < whole.size(); ++i)
+      EXPECT_EQ(whole[i].pixels, resumed[i].pixels) << static_cast<int>(scheduler);
+  }
+}
+
+TEST(Detail, refuses_checkpoints_that_are_damaged_or_of_another_run) {
+  const DetailInputs inputs = made_inputs(1, 64);
+  Checkpoint last;
+  DetailHooks keep;
+  keep.on_checkpoint = [&](const Checkpoint& checkpoint) { last = checkpoint; };
+  run(inputs, short_options(), keep);
+  DetailHooks resume;
+  resume.resume = last;
+  resume.resume->bytes.pop_back();
+  EXPECT_THROW(run(inputs, short_options(), resume), Error);
+  resume.resume = last;
+  EXPECT_THROW(run(made_inputs(2, 64), short_options(), resume), Error);
+}
+
+TEST(Detail, stops_between_steps_when_asked_and_reports_every_step) {
+  std::vector<double> done;
+  bool stop = false;
+  Progress progress;
+  progress.on_update = [&](std::string_view task, double at, double total) {
+    if (task != "detail") return;
+    done.push_back(at);
+    EXPECT_EQ(total, 4);
+    stop = at == 2;
+  };
+  progress.stop_requested = [&] { return stop; };
+  try {
+    run(made_inputs(1, 64), short_options(), {}, progress);
+    FAIL() << "did not stop";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInterrupted);
+  }
+  EXPECT_EQ(done, (std::vector<double>{0, 1, 2}));
+}
+
+TEST(Detail, a_bias_of_zero_is_none_and_another_is_felt) {
+  DetailInputs inputs = made_inputs(2, 128);
+  const std::vector<Image> plain = run(inputs, short_options());
+  inputs.bias_levels = same_place_bias(2, 16);
+  DetailOptions options = short_options();
+  EXPECT_EQ(run(inputs, options)[0].pixels, plain[0].pixels);
+  options.bias_weight = 4;
+  const std::vector<Image> paper = run(inputs, options);
+  EXPECT_GT(max_difference(paper[0], plain[0]), 1e-3);
+  options.bias_scaling = BiasScaling::kAdditive;
+  EXPECT_GT(max_difference(run(inputs, options)[0], paper[0]), 1e-3);
+}
+
+TEST(Detail, options_are_felt) {
+  const DetailInputs inputs = made_inputs(1, 64);
+  const Image plain = run(inputs, short_options())[0];
+  const auto differs = [&](const std::function<void(DetailOptions&)>& change) {
+    DetailOptions options = short_options();
+    change(options);
+    return max_difference(run(inputs, options)[0], plain) > 1e-4;
+  };
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.prompt = "a mossy stone"; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.negative_prompt = "blurry"; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.guidance_scale = 1; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.strength = 0.4f; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.tile_scale = 0; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.normal_scale = 0.5f; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.scheduler = Scheduler::kEuler; }));
+}
+
+TEST(Detail, bf16_stays_near_f32) {
+  const Model model({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kBf16, 0});
+  const DetailInputs inputs = made_inputs(1, 128);
+  DetailOptions options = short_options();
+  options.guidance_scale = 1;
+  const Image f32 = run(inputs, options)[0], bf16 = generate_detail(model, inputs, options, {}, {})[0];
+  double squares = 0;
+  for (size_t i = 0; i < f32.pixels.size(); ++i) squares += std::pow(f32.pixels[i] - bf16.pixels[i], 2);
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(f32.pixels.size())), 0.02);
+}
+
+TEST(Detail, refuses_inputs_that_do_not_fit_and_says_what_would) {
+  const auto message = [](const DetailInputs& inputs, const DetailOptions& options) {
+    try {
+      run(inputs, options);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kUsage) << error.what();
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const DetailInputs good = made_inputs(2, 64);
+  DetailInputs inputs = good;
+  inputs.tile_views.pop_back();
+  EXPECT_NE(message(inputs, short_options()).find("there are 3 images, expected 4"), std::string::npos);
+  inputs = good;
+  inputs.normal_views[2] = Image(64, 32, 3);
+  EXPECT_NE(message(inputs, short_options()).find("64 × 32"), std::string::npos);
+  inputs = good;
+  inputs.noise.pop_back();
+  EXPECT_NE(message(inputs, short_options()).find("expected 1024"), std::string::npos);
+  inputs = good;
+  inputs.bias_levels = same_place_bias(2, 16);
+  EXPECT_NE(message(inputs, short_options()).find("no resolution of the U-Net"), std::string::npos);
+  inputs = good;
+  for (Image& view : inputs.tile_views) view = Image(60, 60, 3);
+  EXPECT_NE(message(inputs, short_options()).find("multiples of 8"), std::string::npos);
+  DetailOptions options = short_options();
+  options.strength = 1.5f;
+  EXPECT_NE(message(good, options).find("strength"), std::string::npos);
+  options = short_options();
+  options.guidance_scale = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(message(good, options).find("guidance scale"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace patina::diffusion
