@@ -62,10 +62,11 @@ TEST_P(SharedAsset, has_the_stated_triangles_materials_and_uv_figures) {
   // may differ by two points.
   const auto check = [](float found, float stated, float tolerance, const char* what) {
     if (stated < 0) return;
-    if (stated == 0)
+    if (stated == 0) {
       EXPECT_LT(found, 1.0f + tolerance) << what;
-    else
+    } else {
       EXPECT_NEAR(found, stated, tolerance + 0.6f) << what;
+    }
   };
   check(overlap, expected.overlap, 2.0f, "overlap");
   check(mirrored, expected.mirrored, 0.5f, "mirrored");

@@ -102,9 +102,9 @@ auto decoding(const std::string& name, Function function) {
 template <class T>
 Image to_unit_range(const std::vector<T>& stored, int width, int height, int channels) {
   Image image(width, height, channels);
-  constexpr float kScale = 1.0f / static_cast<float>(std::numeric_limits<T>::max());
+  constexpr auto kMaximum = static_cast<float>(std::numeric_limits<T>::max());
   std::transform(stored.begin(), stored.end(), image.pixels.begin(),
-                 [](T v) { return static_cast<float>(v) * kScale; });
+                 [](T v) { return static_cast<float>(v) / kMaximum; });
   return image;
 }
 

@@ -1,0 +1,41 @@
+// Colour: the sRGB curve and tone mapping.
+#include "patina/image/color.h"
+
+#include <gtest/gtest.h>
+
+namespace patina {
+namespace {
+
+TEST(Srgb, known_values_and_round_trip) {
+  EXPECT_FLOAT_EQ(srgb_from_linear(0.0f), 0.0f);
+  EXPECT_NEAR(srgb_from_linear(1.0f), 1.0f, 1e-6f);
+  EXPECT_NEAR(linear_from_srgb(0.5f), 0.214041f, 1e-5f);
+  EXPECT_NEAR(srgb_from_linear(0.18f), 0.461356f, 1e-5f);
+  for (int i = -300; i <= 300; ++i) {
+    const float v = static_cast<float>(i) / 200.0f;
+    EXPECT_NEAR(srgb_from_linear(linear_from_srgb(v)), v, 2e-6f);
+  }
+}
+
+TEST(Srgb, is_continuous_and_monotonous_at_the_seam) {
+  EXPECT_NEAR(linear_from_srgb(0.04045f), linear_from_srgb(0.0404501f), 1e-6f);
+  for (float v = 0.0f; v < 0.01f; v += 1e-5f) EXPECT_LT(srgb_from_linear(v), srgb_from_linear(v + 1e-5f));
+}
+
+TEST(Reinhard, inverse_and_derivative_agree_with_it) {
+  for (const float v : {0.0f, 0.01f, 0.5f, 1.0f, 20.0f}) {
+    EXPECT_NEAR(inverse_reinhard(reinhard(v)), v, 1e-4f * (1 + v));
+    const double h = 1e-3 * (1.0 + static_cast<double>(v));
+    const auto exact = [](double x) { return x / (1.0 + x); };
+    EXPECT_NEAR(d_reinhard(v), (exact(v + h) - exact(v - h)) / (2 * h), 1e-5);
+  }
+}
+
+TEST(ToneMap, exposure_doubles_radiance) {
+  Image image(2, 1, 3, 0.5f);
+  const Image mapped = tone_map(image, 1.0f);
+  for (const float v : mapped.pixels) EXPECT_NEAR(v, srgb_from_linear(0.5f), 1e-6f);
+}
+
+}  // namespace
+}  // namespace patina
