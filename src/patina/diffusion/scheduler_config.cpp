@@ -1,6 +1,6 @@
 // scheduler_config.json -> SchedulerConfig. Absent keys get the default of the class that diffusers
 // registers; settings that would change the arithmetic in a way patina does not have are refused by name.
-#include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -83,6 +83,21 @@ std::vector<float> read_trained_betas(const Reader& reader, int count) {
   return betas;
 }
 
+/// The solver of `_class_name`; none for a class that patina lacks, whose noise schedule can still be used.
+std::optional<Solver> named_solver(const Json& object) {
+  const std::pair<const char*, Solver> names[] = {
+      {"DDIMScheduler", Solver::kDdim},
+      {"PNDMScheduler", Solver::kPndm},
+      {"EulerDiscreteScheduler", Solver::kEuler},
+      {"EulerAncestralDiscreteScheduler", Solver::kEulerAncestral},
+      {"DPMSolverMultistepScheduler", Solver::kDpmSolverPp},
+      {"UniPCMultistepScheduler", Solver::kUniPc},
+  };
+  for (const auto& [name, solver] : names)
+    if (object.contains("_class_name") && object.at("_class_name") == name) return solver;
+  return std::nullopt;
+}
+
 void refuse_unsupported(const Reader& reader, const SchedulerConfig& config) {
   reader.refuse_if(reader.boolean("thresholding", false), "thresholding");
   reader.refuse_if(reader.boolean("rescale_betas_zero_snr", false), "rescale_betas_zero_snr");
@@ -100,8 +115,6 @@ void refuse_unsupported(const Reader& reader, const SchedulerConfig& config) {
                    "interpolation_type");
   reader.refuse_if(reader.has("timestep_type") && reader.at("timestep_type") != "discrete", "timestep_type");
   reader.refuse_if(reader.has("variance_type") && config.solver == Solver::kDpmSolverPp, "variance_type");
-  reader.refuse_if(config.solver == Solver::kPndm && !reader.boolean("skip_prk_steps", false),
-                   "skip_prk_steps");
 }
 
 }  // namespace
@@ -113,13 +126,8 @@ SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view c
   const Reader reader(object, std::string(context));
 
   SchedulerConfig config;
-  config.solver = reader.choice("_class_name", Solver::kPndm,
-                                {{"DDIMScheduler", Solver::kDdim},
-                                 {"PNDMScheduler", Solver::kPndm},
-                                 {"EulerDiscreteScheduler", Solver::kEuler},
-                                 {"EulerAncestralDiscreteScheduler", Solver::kEulerAncestral},
-                                 {"DPMSolverMultistepScheduler", Solver::kDpmSolverPp},
-                                 {"UniPCMultistepScheduler", Solver::kUniPc}});
+  const std::optional<Solver> named = named_solver(object);
+  config.solver = named.value_or(Solver::kUniPc);
   const bool ddim = config.solver == Solver::kDdim;
   config.num_train_timesteps = reader.integer("num_train_timesteps", 1000, 2, 1'000'000);
   config.beta_start = reader.number("beta_start", 1e-4, 1e-12, 0.999);
@@ -144,15 +152,16 @@ SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view c
   config.use_karras_sigmas = reader.boolean("use_karras_sigmas", false);
   config.final_sigma = reader.choice("final_sigmas_type", FinalSigma::kZero,
                                      {{"zero", FinalSigma::kZero}, {"sigma_min", FinalSigma::kSigmaMin}});
-  config.solver_order = reader.integer("solver_order", 2, 1, 2);
+  if (named) config.solver_order = reader.integer("solver_order", 2, 1, 2);
+  config.skip_prk_steps = reader.boolean("skip_prk_steps", named != Solver::kPndm);
   config.lower_order_final = reader.boolean("lower_order_final", true);
-  if (config.solver == Solver::kDpmSolverPp) {
+  if (named == Solver::kDpmSolverPp) {
     config.dpm_sde =
         reader.choice("algorithm_type", false, {{"dpmsolver++", false}, {"sde-dpmsolver++", true}});
     config.dpm_variant = reader.choice("solver_type", DpmVariant::kMidpoint,
                                        {{"midpoint", DpmVariant::kMidpoint}, {"heun", DpmVariant::kHeun}});
   }
-  if (config.solver == Solver::kUniPc)
+  if (named == Solver::kUniPc)
     config.unipc_variant = reader.choice("solver_type", UniPcVariant::kBh2,
                                          {{"bh1", UniPcVariant::kBh1}, {"bh2", UniPcVariant::kBh2}});
   refuse_unsupported(reader, config);

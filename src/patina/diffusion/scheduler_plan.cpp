@@ -169,6 +169,9 @@ void check(const SchedulerConfig& config, int num_steps) {
     refuse("steps is " + std::to_string(num_steps) + ", expected 1 to " + std::to_string(train - 1));
   if (config.solver_order < 1 || config.solver_order > 2)
     refuse("solver_order is " + std::to_string(config.solver_order) + ", expected 1 or 2");
+  if (config.solver == Solver::kPndm && !config.skip_prk_steps)
+    refuse(
+        "PNDM with skip_prk_steps = false (Runge-Kutta warm-up) is not supported; choose another scheduler");
   if (!config.trained_betas.empty() && config.trained_betas.size() != static_cast<size_t>(train))
     refuse("trained_betas has " + std::to_string(config.trained_betas.size()) + " values, expected " +
            std::to_string(train));

@@ -36,7 +36,8 @@ struct SchedulerConfig {
   std::optional<TimestepSpacing> spacing;  // nullopt: leading for DDIM and PNDM, linspace for the others
   int steps_offset = 1;                    // added to the timesteps of `leading`
   bool set_alpha_to_one = false;           // DDIM, PNDM: ᾱ past the last step is 1 instead of ᾱ_0
-  bool clip_sample = false;                // DDIM: clamp the predicted sample to ±clip_sample_range
+  bool skip_prk_steps = true;  // PNDM: without Runge-Kutta warm-up; false is refused by make_schedule
+  bool clip_sample = false;    // DDIM: clamp the predicted sample to ±clip_sample_range
   double clip_sample_range = 1.0;
   double eta = 0.0;                // DDIM: 0 deterministic, 1 ancestral [Song2021]
   bool use_karras_sigmas = false;  // Euler, DPM-Solver++, UniPC [Karras2022, Eq. 5]
@@ -50,8 +51,9 @@ struct SchedulerConfig {
 };
 
 /// Reads the text of a scheduler_config.json; `context` (its path) goes into errors. Keys that are absent get
-/// diffusers' default of the class. Throws Error{kFormat} for values of the wrong type or range,
-/// Error{kUnsupported} naming a setting patina lacks.
+/// diffusers' default of the class; a class that patina lacks is read for its noise schedule and gets UniPC.
+/// Throws Error{kFormat} for values of the wrong type or range, Error{kUnsupported} naming a setting patina
+/// lacks.
 SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view context);
 
 /// The model's configuration (betas, prediction, offsets) under the scheduler the user chose, with that
