@@ -196,6 +196,19 @@ TEST(Noise, hidden_and_turned_away_surface_gives_nothing) {
       0.2);
 }
 
+TEST(Noise, holes_of_a_mask_take_no_part) {
+  // Through a sheet that is all hole the views see a wall; the sheet's own points would dilute its noise.
+  scenes::Constant hole;
+  hole.alpha = 0.0f;
+  hole.alpha_mode = asset::AlphaMode::kMask;
+  const auto wall = scenes::quad(vec3(-2, -2, 0), vec3(4, 0, 0), vec3(0, 4, 0));
+  const auto sheet = scenes::quad(vec3(-2, -2, 1), vec3(4, 0, 0), vec3(0, 4, 0));
+  const World world = make_world({{wall, {}}, {sheet, hole}});
+  const auto cameras = cameras_at({-20, 0, 20, 40}, 256);
+  const auto noises = noises_of(world, cameras, NoiseMode::kExact);
+  EXPECT_NEAR(noise_agreement(*world.scene, cameras, 8, noises, 0, 1).of_bound(), 1.0, 0.1);
+}
+
 TEST(Noise, empty_view_is_white) {
   const World world = sphere_world(UvState::kClean, 8);
   const render::Camera away = render::look_at(vec3(0, 0, 5), vec3(0, 0, 10), 0.5f, 512, 512);
