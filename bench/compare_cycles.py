@@ -19,6 +19,7 @@ VIEWS = {
     "shoe": ("MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", (0.30, 0.25, 0.42), (0.0, 0.05, 0.0)),
 }
 FOV_DEGREES = "35"
+EXPOSURE_EV = "2"  # of the pictures
 DEPTH = "9"  # segments after the camera ray: Cycles counts bounces (8), the last of which may still reach a light
 
 
@@ -58,7 +59,7 @@ def main():
             numbers = out / f"cycles_{name}_{model}.json"
             run([arguments.build / "bench_render_view", assets / path, out / f"cycles_{name}_{model}.exr", "--environment", hdr,
                  "--eye", *eye, "--target", *target, "--fov", FOV_DEGREES, "--size", arguments.size, "--samples",
-                 arguments.samples, "--depth", DEPTH, "--reference", cycles, "--report", numbers, *picture,
+                 arguments.samples, "--depth", DEPTH, "--exposure", EXPOSURE_EV, "--reference", cycles, "--report", numbers, *picture,
                  *(["--principled"] if model == "principled" else [])])
             report[f"{name}_{model}"] = json.loads(numbers.read_text())
             numbers.unlink()

@@ -41,11 +41,12 @@ double camera_rays_per_second(const render::Scene& scene, const render::Camera& 
 }
 
 /// How a render differs from a reference over the pixels that the asset covers wholly.
-nlohmann::json compare(const render::Render& render, const Image& reference) {
+nlohmann::json compare(const render::Render& render, const Image& reference, float exposure_ev) {
   glm::dvec3 sum(0.0), reference_sum(0.0), absolute(0.0);
   double display_absolute = 0, display_squared = 0, noise = 0;
   int64_t pixels = 0;
-  const Image display = tone_map(render.radiance, 0.0f), reference_display = tone_map(reference, 0.0f);
+  const Image display = tone_map(render.radiance, exposure_ev);
+  const Image reference_display = tone_map(reference, exposure_ev);
   for (int y = 0; y < reference.height; ++y)
     for (int x = 0; x < reference.width; ++x) {
       if (render.coverage.at(x, y)[0] < 1.0f) continue;
@@ -72,8 +73,8 @@ nlohmann::json compare(const render::Render& render, const Image& reference) {
 }
 
 /// Render, reference, and ½ + 4 × their difference beside each other; [H, 3W, 3] sRGB.
-Image side_by_side(const Image& radiance, const Image& reference) {
-  const Image a = tone_map(radiance, 0.0f), b = tone_map(reference, 0.0f);
+Image side_by_side(const Image& radiance, const Image& reference, float exposure_ev) {
+  const Image a = tone_map(radiance, exposure_ev), b = tone_map(reference, exposure_ev);
   Image out(3 * a.width, a.height, 3);
   for (int y = 0; y < a.height; ++y)
     for (int x = 0; x < a.width; ++x) {
@@ -90,8 +91,7 @@ Image side_by_side(const Image& radiance, const Image& reference) {
 int main(int argc, char** argv) {
   CLI::App app{"Renders one view of an asset with patina's path tracer"};
   std::filesystem::path asset_path, out_path, environment_path, reference_path, picture_path, report_path;
-  vec3 eye(0.0f), target(0.0f);
-  float fov_degrees = 35.0f;
+  float fov_degrees = 35.0f, exposure_ev = 0.0f;
   int size = 512, samples = 64, depth = 8;
   bool show_environment = false, principled = false;
   std::vector<float> eye_values, target_values;
@@ -106,6 +106,7 @@ int main(int argc, char** argv) {
   app.add_option("--size", size, "pixels a side");
   app.add_option("--samples", samples, "paths a pixel");
   app.add_option("--depth", depth, "path segments after the camera ray");
+  app.add_option("--exposure", exposure_ev, "of PNG files, stops");
   app.add_flag("--show-environment", show_environment, "show the environment behind the asset");
   app.add_flag("--principled", principled, "Burley's principled model instead of glTF's");
   app.add_option("--reference", reference_path, "EXR of the same view and size to compare with");
@@ -117,11 +118,11 @@ int main(int argc, char** argv) {
   try {
     const asset::Asset asset = asset::read_asset(asset_path);
     const asset::Bounds bounds = asset::bounds(asset);
-    target =
+    const vec3 target =
         target_values.empty() ? bounds.center() : vec3(target_values[0], target_values[1], target_values[2]);
     const float distance = 1.05f * bounds.radius() / std::sin(0.5f * glm::radians(fov_degrees));
-    eye = eye_values.empty() ? target + distance * glm::normalize(vec3(0.5f, 0.4f, 1.0f))
-                             : vec3(eye_values[0], eye_values[1], eye_values[2]);
+    const vec3 eye = eye_values.empty() ? target + distance * glm::normalize(vec3(0.5f, 0.4f, 1.0f))
+                                        : vec3(eye_values[0], eye_values[1], eye_values[2]);
 
     auto start = std::chrono::steady_clock::now();
     render::Scene::Options scene_options;
@@ -145,16 +146,18 @@ int main(int argc, char** argv) {
                 num_threads());
     std::printf("camera rays alone: %.3f M/s\n", camera_rays_per_second(scene, camera) * 1e-6);
 
-    write_image(out_path, out_path.extension() == ".exr" ? result.radiance : tone_map(result.radiance, 0.0f));
+    write_image(out_path,
+                out_path.extension() == ".exr" ? result.radiance : tone_map(result.radiance, exposure_ev));
     if (!reference_path.empty()) {
       const Image reference = read_hdr(reference_path);
       if (reference.width != size || reference.height != size)
         throw Error(ErrorCode::kUsage, reference_path.string(), "the reference must have the render's size");
-      nlohmann::json report = compare(result, reference);
+      nlohmann::json report = compare(result, reference, exposure_ev);
       report["seconds"] = seconds;
       report["samples"] = samples;
       std::printf("%s\n", report.dump(2).c_str());
-      if (!picture_path.empty()) write_image(picture_path, side_by_side(result.radiance, reference));
+      if (!picture_path.empty())
+        write_image(picture_path, side_by_side(result.radiance, reference, exposure_ev));
       if (!report_path.empty()) write_file(report_path, report.dump(2) + "\n");
     }
   } catch (const Error& error) {

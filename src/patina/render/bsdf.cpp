@@ -38,18 +38,23 @@ float specular_pdf(float alpha, const ReflectionAngles<float>& angles) {
 }  // namespace
 
 vec3 eval_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, const vec3& wi) {
-  if (below_surface(wo, wi)) return vec3(0.0f);
-  const auto factors = reflection_factors(model, params.roughness, params.metallic, angles_in_frame(wo, wi));
-  vec3 value;
-  for (int c = 0; c < 3; ++c) value[c] = reflection_channel(model, params.base_color[c], factors);
-  return value;
+  return evaluate_bsdf(model, params, wo, wi).value;
 }
 
 float pdf_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, const vec3& wi) {
-  if (below_surface(wo, wi)) return 0.0f;
+  return evaluate_bsdf(model, params, wo, wi).pdf;
+}
+
+BsdfEvaluation evaluate_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, const vec3& wi) {
+  BsdfEvaluation out;
+  if (below_surface(wo, wi)) return out;
+  const ReflectionAngles<float> angles = angles_in_frame(wo, wi);
+  const auto factors = reflection_factors(model, params.roughness, params.metallic, angles);
+  for (int c = 0; c < 3; ++c) out.value[c] = reflection_channel(model, params.base_color[c], factors);
   const float p_specular = specular_probability(model, params, wo);
-  const float alpha = alpha_from_roughness(params.roughness);
-  return p_specular * specular_pdf(alpha, angles_in_frame(wo, wi)) + (1.0f - p_specular) * wi.z * kInvPi;
+  out.pdf = p_specular * specular_pdf(alpha_from_roughness(params.roughness), angles) +
+            (1.0f - p_specular) * wi.z * kInvPi;
+  return out;
 }
 
 BsdfSample sample_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, float u_lobe,
@@ -64,9 +69,9 @@ BsdfSample sample_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo
   }
   // A microfacet may reflect below the horizon: that light is what single scattering loses.
   if (!(wi.z > 0.0f)) return {};
-  const float pdf = pdf_bsdf(model, params, wo, wi);
-  if (!(pdf > 0.0f)) return {};
-  return {wi, eval_bsdf(model, params, wo, wi) / pdf, pdf};
+  const BsdfEvaluation evaluation = evaluate_bsdf(model, params, wo, wi);
+  if (!(evaluation.pdf > 0.0f)) return {};
+  return {wi, evaluation.value / evaluation.pdf, evaluation.pdf};
 }
 
 BsdfGradient eval_bsdf_gradient(BsdfModel model, const BsdfParams& params, const vec3& n_world,

@@ -21,6 +21,13 @@ vec3 eval_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, const 
 /// Density of sample_bsdf, per steradian.
 float pdf_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, const vec3& wi);
 
+/// Both at once, for less than twice the work.
+struct BsdfEvaluation {
+  vec3 value{0.0f};  // eval_bsdf
+  float pdf = 0.0f;  // pdf_bsdf
+};
+BsdfEvaluation evaluate_bsdf(BsdfModel model, const BsdfParams& params, const vec3& wo, const vec3& wi);
+
 struct BsdfSample {
   vec3 wi;
   vec3 weight;     // f · |cos θi| / pdf

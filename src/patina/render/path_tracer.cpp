@@ -34,13 +34,13 @@ vec3 direct_light(const Scene& scene, const SurfacePoint& point, const Frame& fr
   const auto arriving = [&](const LightSample& light, bool met_by_bsdf) {
     if (!(glm::dot(light.direction, point.n_geometric) > 0.0f)) return vec3(0.0f);
     const vec3 wi = frame.to_local(light.direction);
-    const vec3 reflected = eval_bsdf(model, point.bsdf, wo, wi) * light.radiance;
+    const BsdfEvaluation bsdf = evaluate_bsdf(model, point.bsdf, wo, wi);
+    const vec3 reflected = bsdf.value * light.radiance;
     if (!(max_component(reflected) > 0.0f)) return vec3(0.0f);
     const Ray shadow =
         light.at_infinity ? spawn_ray(point, light.direction) : spawn_segment(point, light.p_light);
     if (scene.occluded(shadow, random.uniform())) return vec3(0.0f);
-    const float weight =
-        met_by_bsdf ? balance_heuristic(light.pdf, pdf_bsdf(model, point.bsdf, wo, wi)) : 1.0f;
+    const float weight = met_by_bsdf ? balance_heuristic(light.pdf, bsdf.pdf) : 1.0f;
     return reflected * (weight / light.pdf);
   };
 

@@ -38,8 +38,8 @@ struct AlphaContext {
   }
 };
 
-/// Called for single rays only (N = 1). Rejects holes of masked materials, and blended layers that the ray has
-/// passed already.
+/// Called for single rays only (N = 1). Rejects holes of masked materials, and blended layers that the ray
+/// has passed already.
 void alpha_filter(const RTCFilterFunctionNArguments* args) {
   const auto* state = static_cast<const Scene::State*>(args->geometryUserPtr);
   const uint32_t geometry = RTCHitN_geomID(args->hit, 1, 0), triangle = RTCHitN_primID(args->hit, 1, 0);

@@ -23,6 +23,51 @@ vec3 lookup3(const asset::Map& map, const vec2& uv_map) {
   return map.texels.num_pixels() == 1 ? map.texels.rgb(0, 0) : asset::sample3(map, uv_map);
 }
 
+/// Reads several maps at one point. Maps of a material mostly share size, UV set, transform and wrap modes:
+/// their bilinear tap is then computed once.
+class MapReader {
+ public:
+  explicit MapReader(const SurfacePoint& point) : point_(point) {}
+
+  float read1(const asset::Map& map) {
+    if (map.texels.num_pixels() == 1) return map.texels.pixels[0];
+    const asset::BilinearTap& tap = tap_of(map);
+    float sum = 0.0f;
+    for (size_t i = 0; i < 4; ++i)
+      sum += tap.weight[i] * map.texels.pixels[static_cast<size_t>(tap.texel[i])];
+    return sum;
+  }
+  vec3 read3(const asset::Map& map) {
+    if (map.texels.num_pixels() == 1) return map.texels.rgb(0, 0);
+    const asset::BilinearTap& tap = tap_of(map);
+    vec3 sum(0.0f);
+    for (size_t i = 0; i < 4; ++i) {
+      const float* texel = map.texels.pixels.data() + 3 * static_cast<size_t>(tap.texel[i]);
+      sum += tap.weight[i] * vec3(texel[0], texel[1], texel[2]);
+    }
+    return sum;
+  }
+
+ private:
+  const asset::BilinearTap& tap_of(const asset::Map& map) {
+    if (!last_ || !same_layout(*last_, map)) {
+      const auto set = static_cast<size_t>(map.uv_set);
+      tap_ = asset::bilinear_tap(map,
+                                 asset::map_uv(map, set < point_.num_uv_sets ? point_.uv[set] : vec2(0.0f)));
+      last_ = &map;
+    }
+    return tap_;
+  }
+  static bool same_layout(const asset::Map& a, const asset::Map& b) {
+    return a.texels.width == b.texels.width && a.texels.height == b.texels.height && a.uv_set == b.uv_set &&
+           a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t && a.uv_transform == b.uv_transform;
+  }
+
+  const SurfacePoint& point_;
+  const asset::Map* last_ = nullptr;
+  asset::BilinearTap tap_{};
+};
+
 vec3 normalized_or(const vec3& v, const vec3& fallback) {
   const float length = glm::length(v);
   return length > 0.0f && std::isfinite(length) ? v / length : fallback;
@@ -86,17 +131,13 @@ SurfacePoint Scene::surface(const Ray& ray, const Hit& hit) const {
   if (!primitive.color.empty()) out.vertex_color = vec3(interpolate(primitive.color, t, w));
 
   const asset::MaterialMaps& material = state_->material(hit.primitive);
-  const auto uv_of = [&](const asset::Map& map) {
-    const auto set = static_cast<size_t>(map.uv_set);
-    return asset::map_uv(map, set < out.num_uv_sets ? out.uv[set] : vec2(0.0f));
-  };
-  out.bsdf.base_color =
-      glm::clamp(lookup3(material.base_color, uv_of(material.base_color)) * out.vertex_color, 0.0f, 1.0f);
-  out.bsdf.roughness = glm::clamp(lookup1(material.roughness, uv_of(material.roughness)), 0.0f, 1.0f);
-  out.bsdf.metallic = glm::clamp(lookup1(material.metallic, uv_of(material.metallic)), 0.0f, 1.0f);
-  out.emission = lookup3(material.emission, uv_of(material.emission));
+  MapReader maps(out);
+  out.bsdf.base_color = glm::clamp(maps.read3(material.base_color) * out.vertex_color, 0.0f, 1.0f);
+  out.bsdf.roughness = glm::clamp(maps.read1(material.roughness), 0.0f, 1.0f);
+  out.bsdf.metallic = glm::clamp(maps.read1(material.metallic), 0.0f, 1.0f);
+  out.emission = maps.read3(material.emission);
 
-  const vec3 n_map = lookup3(material.normal, uv_of(material.normal));
+  const vec3 n_map = maps.read3(material.normal);
   const vec3 n_mapped = normalized_or(n_map.x * tangent + n_map.y * bitangent + n_map.z * n, n);
   out.n_shading = visible_shading_normal(n_mapped, out.n_geometric, -ray.direction);
   out.n_shading_moved = out.n_shading != n_mapped;
