@@ -7,6 +7,7 @@
 
 #include "patina/base/error.h"
 #include "patina/diffusion/golden.h"
+#include "patina/nn/threads.h"
 
 namespace {
 
@@ -41,6 +42,7 @@ int run(const std::filesystem::path& model, const std::filesystem::path& golden)
 }  // namespace
 
 int main(int argc, char** argv) {
+  patina::nn::sleep_between_parallel_regions(argv);
   if (argc != 3) {
     std::fprintf(stderr,
                  "usage: golden_check MODEL_DIR GOLDEN_DIR\n"

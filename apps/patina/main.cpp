@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "console.h"
 #include "patina/base/error.h"
+#include "patina/nn/threads.h"
 
 namespace {
 
@@ -33,6 +34,7 @@ int exit_code_of(patina::ErrorCode code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  patina::nn::sleep_between_parallel_regions(argv);
   CLI::App program(
       "patina adds generated detail (rust, moss, wear, dust, age) to the material of an existing 3D asset.\n"
       "Mesh, UVs and file structure stay; base colour, normal and roughness textures change.\n\n"
