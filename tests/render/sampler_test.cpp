@@ -13,12 +13,12 @@
 namespace patina::render {
 namespace {
 
-constexpr int kSamples = 100000;
+constexpr int kSamples = 60000;
 constexpr BsdfModel kModels[] = {BsdfModel::kGltf, BsdfModel::kPrincipled};
-constexpr float kRoughness[] = {0.05f, 0.2f, 0.4f, 0.7f, 1.0f};
+constexpr float kRoughness[] = {0.05f, 0.2f, 0.5f, 1.0f};
 constexpr float kAngles[] = {0.0f, 30.0f, 60.0f, 85.0f};
 constexpr float kMetallic[] = {0.0f, 0.6f, 1.0f};
-constexpr int kNumBsdfTests = 2 * 5 * 4 * 3;
+constexpr int kNumBsdfTests = 2 * 4 * 4 * 3;
 constexpr int kNumTests =
     kNumBsdfTests + 12;  // BSDFs, then visible normals, cosine, triangle, environments, lights
 
