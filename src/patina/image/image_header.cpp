@@ -249,7 +249,7 @@ ImageHeader inspect_exr(Bytes bytes, const std::string& name, const ImageLimits&
   if (version & 0x1000u)
     fail(name, "the EXR file has several parts; save the environment as a single part",
          ErrorCode::kUnsupported);
-  // Attributes: name\0 type\0 size value, ended by an empty name [OpenEXR, file layout].
+  // Attributes: name\0 type\0 size value, ended by an empty name as OpenEXR's file layout describes.
   size_t at = 8;
   const auto word = [&]() -> std::string_view {
     const auto* begin = reinterpret_cast<const char*>(bytes.data()) + at;
