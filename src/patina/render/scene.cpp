@@ -1,8 +1,9 @@
 // Builds the Embree scene and answers ray queries. The only file that calls Embree.
 #include "patina/render/scene.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
-#include <limits>
 #include <string>
 
 #include "patina/base/check.h"
@@ -12,11 +13,12 @@
 namespace patina::render {
 namespace {
 
-constexpr int kMaxPassed = 8;  // remembered layers that a ray went through near its present distance
-constexpr int kMaxAlphaLayers =
-    256;  // blended layers that a ray may pass before it gives up and counts as a miss
-constexpr float kSameLayer =
-    0x1p-21f;  // relative distance within which two hits of a primitive are one layer
+// Layers that a ray went through near its present distance, remembered so that they are not met again.
+constexpr int kMaxPassed = 8;
+// Blended layers that a ray may pass before it gives up and counts as a miss.
+constexpr int kMaxAlphaLayers = 256;
+// Relative distance within which two hits of one primitive are one layer.
+constexpr float kSameLayer = 0x1p-21f;
 
 /// What Embree hands to the filter: its own context first, as the library demands.
 struct AlphaContext {
