@@ -39,7 +39,11 @@ void read_as(const std::string& kind, const std::filesystem::path& path) {
 [[noreturn]] void run_child(const std::string& kind, const std::string& path, int message_fd,
                             int terminal_fd) {
   const rlimit memory{kMaxAddressSpace, kMaxAddressSpace}, no_core{0, 0};
+#ifndef __SANITIZE_ADDRESS__  // which reserves far more address space than it uses
   ::setrlimit(RLIMIT_AS, &memory);
+#else
+  (void)memory;
+#endif
   ::setrlimit(RLIMIT_CORE, &no_core);
   ::dup2(terminal_fd, STDOUT_FILENO);
   ::dup2(terminal_fd, STDERR_FILENO);
