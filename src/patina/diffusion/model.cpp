@@ -15,7 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Below this the networks are so small that conversions and overhead eat what bf16 wins, and f32 is exact.
+/// Smaller networks run in f32: it is exact, and their time goes into attention and small passes, of which
+/// bf16 takes no more than a third off (small model, 96² latents, two cores with AMX: 1.8 against 1.2
+/// processor seconds). In networks of SD 1.5's size convolutions and products rule, which bf16 makes two to
+/// four times as fast.
 constexpr uintmax_t kLargeWeightBytes = 400'000'000;
 
 /// bf16 pays where the processor multiplies it natively and the networks are large enough to be bound by
