@@ -9,7 +9,7 @@ packages=(
   g++ cmake ninja-build ccache git ca-certificates
   libtorch-dev libopenblas0-pthread   # networks; without OpenBLAS matrix products fall to 5 GFLOP/s
   libembree-dev libtbb-dev            # ray casting, threads
-  libopenimageio-dev libwebp-dev      # image files, animated turntables
+  libopenimageio-dev libwebp-dev zlib1g-dev   # image files, animated turntables, PNG checksums
   nlohmann-json3-dev libglm-dev libcli11-dev libspdlog-dev libxxhash-dev
   libgtest-dev libbenchmark-dev
 )
