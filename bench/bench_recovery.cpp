@@ -50,6 +50,10 @@ int main(int argc, char** argv) {
       options.fit.texture_size = number();
     else if (flag == "--rate" && i + 1 < argc)
       options.fit.learning_rate = static_cast<float>(std::atof(argv[++i]));
+    else if (flag == "--from-truth")
+      options.start_at_truth = true;
+    else if (flag == "--no-normals")
+      options.fit.fit_normal = false;
     else if (flag == "--metallic")
       options.fit.fit_metallic = options.flatten_metallic = true;
     else if (flag == "--out" && i + 1 < argc)

@@ -49,6 +49,7 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
   r.truth = asset::resolve_materials(r.asset);
   r.start = r.truth;
   for (asset::MaterialMaps& maps : r.start) {
+    if (options.start_at_truth) break;
     flatten(maps.base_color);
     flatten(maps.roughness);
     if (options.flatten_metallic) flatten(maps.metallic);

@@ -86,6 +86,13 @@ void to_stored(MapGradient& gradient, const CurrentValues& current, float weight
   gradient.metallic = bounded(gradient.metallic, current.overshoot.metallic, weight);
 }
 
+void add(MapGradient& sum, const MapGradient& gradient) {
+  sum.base_color += gradient.base_color;
+  sum.roughness += gradient.roughness;
+  sum.metallic += gradient.metallic;
+  sum.normal += gradient.normal;
+}
+
 const float* slot_gradient(const MapGradient& gradient, Slot slot) {
   switch (slot) {
     case Slot::kBaseColor:
@@ -109,24 +116,19 @@ Evaluation evaluate(const LightCache& cache, std::span<const FittedMap> fitted, 
   std::vector<MapGradient> gradients(cache.samples.size());
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      std::array<CurrentValues, 2> current;
-      std::array<Shading, 2> shading;
-      std::array<vec3, 2> radiance;
-      for (size_t half = 0; half < 2; ++half) {
-        const CacheSample& sample = cache.samples[2 * i + half];
-        current[half] = current_values(table, sample);
-        shading[half] = shade_values(sample.point, current[half].values);
-        radiance[half] = shade(model, sample, shading[half], cache.lights_of(2 * i + half));
-      }
+      const CacheSample& sample = cache.samples[i];
       const CachePixel& pixel = cache.pixels[i];
-      const PixelLoss loss = relative_l2(0.5f * (radiance[0] + radiance[1]), pixel.target, gain);
+      const CurrentValues current = current_values(table, sample);
+      const Shading shading = shade_values(sample.point, current.values);
+      const vec3 radiance_a = shade(model, sample, shading, cache.lights_of(i, 0));
+      const vec3 radiance_b = shade(model, sample, shading, cache.lights_of(i, 1));
+      const PixelLoss loss = relative_l2(radiance_a, radiance_b, pixel.target, gain);
       pixel_loss[i] = pixel.weight * loss.value;
-      for (size_t half = 0; half < 2; ++half) {
-        const size_t s = 2 * i + half;
-        const vec3 d_radiance = 0.5f * pixel.weight * loss.d_radiance;
-        gradients[s] = shade_adjoint(model, cache.samples[s], shading[half], cache.lights_of(s), d_radiance);
-        to_stored(gradients[s], current[half], pixel.weight);
-      }
+      gradients[i] =
+          shade_adjoint(model, sample, shading, cache.lights_of(i, 0), pixel.weight * loss.d_radiance_a);
+      add(gradients[i],
+          shade_adjoint(model, sample, shading, cache.lights_of(i, 1), pixel.weight * loss.d_radiance_b));
+      to_stored(gradients[i], current, pixel.weight);
     }
   });
 
@@ -166,13 +168,10 @@ std::vector<vec3> shade_pixels(const LightCache& cache, std::span<const FittedMa
   std::vector<vec3> radiance(cache.pixels.size());
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      vec3 sum(0.0f);
-      for (size_t s = 2 * i; s < 2 * i + 2; ++s) {
-        const CacheSample& sample = cache.samples[s];
-        sum += shade(model, sample, shade_values(sample.point, current_values(table, sample).values),
-                     cache.lights_of(s));
-      }
-      radiance[i] = 0.5f * sum;
+      const CacheSample& sample = cache.samples[i];
+      const Shading shading = shade_values(sample.point, current_values(table, sample).values);
+      radiance[i] = 0.5f * (shade(model, sample, shading, cache.lights_of(i, 0)) +
+                            shade(model, sample, shading, cache.lights_of(i, 1)));
     }
   });
   return radiance;

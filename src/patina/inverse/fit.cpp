@@ -34,7 +34,7 @@ Prior prior_of(Slot slot) {
     case Slot::kBaseColor:
       return {0.3f, 0.05f, 1e-3f};
     case Slot::kRoughness:
-      return {1.0f, 0.1f, 1e-3f};
+      return {1.0f, 0.1f, 0.02f};
     case Slot::kMetallic:
       return {0.2f, 0.1f, 1e-3f};
     case Slot::kNormal:
@@ -43,12 +43,25 @@ Prior prior_of(Slot slot) {
   return {3.0f, 0.1f, 0.5f};
 }
 
-// Normals wait until colours are about right: a wrong colour looks like a tilted surface from one side.
-constexpr float kNormalStart = 0.25f;
+// Maps join one after the other, at these shares of the iterations: while a colour is far too bright, a
+// smoother or tilted surface also darkens it, and roughness would run into a mirror from which no gradient
+// leads back.
+float start_of(Slot slot) {
+  switch (slot) {
+    case Slot::kBaseColor:
+      return 0.0f;
+    case Slot::kRoughness:
+    case Slot::kMetallic:
+      return 0.2f;
+    case Slot::kNormal:
+      break;
+  }
+  return 0.4f;
+}
 
-// The first tenth of the iterations moves levels from a quarter of the finest size down, the second from a
-// half, the rest all.
-constexpr int kCoarseLevels = 2, kStages = 10;
+// The first twentieth of the iterations moves levels from a quarter of the finest size down, the second from
+// a half, the rest all.
+constexpr int kCoarseLevels = 2, kStages = 20;
 constexpr double kSecondsBetweenCheckpoints = 20;
 
 // Sizes a map without texture gets from what the views resolve.
@@ -181,13 +194,15 @@ float learning_rate(const FitOptions& options, int iteration) {
 }
 
 void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
-  const bool normals_wait =
-      static_cast<float>(state.next_iteration) < kNormalStart * static_cast<float>(options.iterations) &&
-      (options.fit_base_color || options.fit_roughness);
+  // Without the maps that should come first nothing is worth waiting for.
+  const float progress =
+      static_cast<float>(state.next_iteration) / static_cast<float>(std::max(1, options.iterations));
+  float first_start = 1.0f;
+  for (const FittedMap& map : state.fitted) first_start = std::min(first_start, start_of(map.slot));
   parallel_for(0, static_cast<int64_t>(state.fitted.size()), 1, [&](int64_t begin, int64_t end) {
     for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
       FittedMap& map = state.fitted[f];
-      if (map.slot == Slot::kNormal && normals_wait) continue;
+      if (progress + first_start < start_of(map.slot)) continue;
       const Prior prior = prior_of(map.slot);
       Image& gradient = evaluation.d_delta[f];
       for (size_t i = 0; i < gradient.pixels.size(); ++i)
@@ -296,8 +311,10 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     progress.update("fit", state.next_iteration, options.iterations);
 
     const std::chrono::duration<double> since = Clock::now() - last_checkpoint;
-    if (hooks.on_checkpoint &&
-        (since.count() > kSecondsBetweenCheckpoints || state.next_iteration == options.iterations)) {
+    const bool is_due = since.count() > kSecondsBetweenCheckpoints ||
+                        state.next_iteration == options.iterations ||
+                        (hooks.every_iterations > 0 && state.next_iteration % hooks.every_iterations == 0);
+    if (hooks.on_checkpoint && is_due) {
       hooks.on_checkpoint(make_checkpoint(state));
       last_checkpoint = Clock::now();
     }

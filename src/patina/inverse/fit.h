@@ -34,7 +34,8 @@ struct FitCheckpoint {
 };
 struct FitHooks {
   std::function<void(const FitCheckpoint&)>
-      on_checkpoint;  // now and then (at least every 30 s) and at the end
+      on_checkpoint;         // now and then (at least every 30 s) and at the end
+  int every_iterations = 0;  // more often than that: a checkpoint each this many iterations; 0: by time alone
   std::optional<FitCheckpoint> resume;
 };
 

@@ -9,11 +9,10 @@
 namespace patina::inverse {
 namespace {
 
-// Where in its pixel half `half` of generation `g` looks: the R2 sequence over generations, shifted by a
-// random amount that belongs to the pixel, so that few generations cover the pixel evenly. Source: the
-// plastic constant's additive recurrence.
-vec2 jitter(const vec2& shift, uint32_t generation, int half) {
-  const double n = 2.0 * generation + half;
+// Where in its pixel generation `g` looks: the R2 sequence, an additive recurrence on the plastic constant,
+// shifted by a random amount that belongs to the pixel, so that few generations cover the pixel evenly.
+vec2 jitter(const vec2& shift, uint32_t generation) {
+  const double n = generation;
   const double x = shift.x + n * 0.7548776662466927, y = shift.y + n * 0.5698402909980532;
   return {static_cast<float>(x - std::floor(x)), static_cast<float>(y - std::floor(y))};
 }
@@ -47,42 +46,37 @@ LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
   const GatherOptions gather{std::max(1, options.light_samples / 2), options.max_depth};
   LightCache cache;
   cache.pixels = std::move(pixels);
-  cache.lights_per_sample = num_entries(scene, gather);
-  cache.samples.resize(2 * cache.pixels.size());
-  cache.lights.resize(cache.samples.size() * static_cast<size_t>(cache.lights_per_sample));
+  cache.lights_per_list = num_entries(scene, gather);
+  cache.samples.resize(cache.pixels.size());
+  cache.lights.resize(2 * cache.pixels.size() * static_cast<size_t>(cache.lights_per_list));
 
   constexpr int64_t kPixelsPerTask = 64;
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
     progress.throw_if_stopped();
-    std::vector<IncidentLight> lights(static_cast<size_t>(cache.lights_per_sample));
+    std::vector<IncidentLight> lights(static_cast<size_t>(cache.lights_per_list));
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       const CachePixel& pixel = cache.pixels[i];
       const render::Camera& camera = views.views[pixel.view].camera;
       const uint64_t index = (uint64_t{pixel.view} << 32) | (uint64_t{pixel.y} << 16) | pixel.x;
       RandomStream pixel_random(options.seed, RandomPurpose::kLightCache, index, 0);
       const vec2 shift = pixel_random.uniform2();
-      for (int half = 0; half < 2; ++half) {
-        const size_t s = 2 * i + static_cast<size_t>(half);
-        CacheSample& sample = cache.samples[s];
-        sample = {};
-        RandomStream random(options.seed, RandomPurpose::kLightCache, index,
-                            1 + 2 * options.generation + static_cast<uint32_t>(half));
-        const render::Ray ray = camera.ray(vec2(pixel.x, pixel.y) + jitter(shift, options.generation, half));
-        const auto hit = scene.intersect(ray, random.uniform());
-        if (!hit) continue;
-        const render::SurfacePoint surface = scene.surface(ray, *hit);
-        const auto material = static_cast<size_t>(surface.material);
-        const bool is_context = material >= base_maps.size();
-        sample.point = material_point(surface, -ray.direction, scene.materials()[material]);
-        sample.base =
-            sample_maps(is_context ? scene.materials()[material] : base_maps[material], sample.point);
-        sample.emission = surface.emission;
-        sample.hit = true;
-
+      RandomStream random(options.seed, RandomPurpose::kLightCache, index, 1 + options.generation);
+      const render::Ray ray = camera.ray(vec2(pixel.x, pixel.y) + jitter(shift, options.generation));
+      const auto hit = scene.intersect(ray, random.uniform());
+      if (!hit) continue;
+      const render::SurfacePoint surface = scene.surface(ray, *hit);
+      const auto material = static_cast<size_t>(surface.material);
+      const bool is_context = material >= base_maps.size();
+      CacheSample& sample = cache.samples[i];
+      sample.point = material_point(surface, -ray.direction, scene.materials()[material]);
+      sample.base = sample_maps(is_context ? scene.materials()[material] : base_maps[material], sample.point);
+      sample.emission = surface.emission;
+      sample.hit = true;
+      for (size_t list = 0; list < 2; ++list) {
         gather_light(scene, surface, -ray.direction, gather, random, lights);
-        for (size_t k = 0; k < lights.size(); ++k)
-          cache.lights[s * lights.size() + k] = {pack_direction(lights[k].wi),
-                                                 pack_radiance(lights[k].weighted_radiance)};
+        PackedLight* packed = cache.lights.data() + (2 * i + list) * lights.size();
+        for (const IncidentLight& light : lights)
+          *packed++ = {pack_direction(light.wi), pack_radiance(light.weighted_radiance)};
       }
     }
   });

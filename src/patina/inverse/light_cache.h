@@ -20,13 +20,12 @@ struct PackedLight {
   uint32_t radiance = 0;
 };
 
-/// A camera ray's hit: half of a pixel. The two halves are independent estimates of the pixel, see
-/// relative_l2.
+/// What a pixel's camera ray met.
 struct CacheSample {
   MaterialPoint point;
   MapValues base;       // the starting maps at the point, before any change
   vec3 emission{0.0f};  // W/m²/sr
-  bool hit = false;     // false: the ray met nothing, the half is black
+  bool hit = false;     // false: the ray met nothing, the pixel is black
 };
 
 /// A pixel that counts in the loss.
@@ -37,21 +36,23 @@ struct CachePixel {
   vec3 target{0.0f};  // tone-mapped linear
 };
 
+/// Each pixel has two lists of lights, drawn independently: two estimates of the same radiance, see
+/// relative_l2.
 struct LightCache {
   std::vector<CachePixel> pixels;    // view by view, rows from the top
-  std::vector<CacheSample> samples;  // [pixels, 2]
-  std::vector<PackedLight> lights;   // [pixels, 2, lights_per_sample]
-  int lights_per_sample = 0;
+  std::vector<CacheSample> samples;  // [pixels]
+  std::vector<PackedLight> lights;   // [pixels, 2, lights_per_list]
+  int lights_per_list = 0;
 
-  std::span<const PackedLight> lights_of(size_t sample) const {
-    const auto n = static_cast<size_t>(lights_per_sample);
-    return {lights.data() + sample * n, n};
+  std::span<const PackedLight> lights_of(size_t pixel, size_t list) const {
+    const auto n = static_cast<size_t>(lights_per_list);
+    return {lights.data() + (2 * pixel + list) * n, n};
   }
   size_t bytes() const;
 };
 
 struct CacheOptions {
-  int light_samples = 32;  // directions a pixel, half of them for each of its two points
+  int light_samples = 32;  // directions a pixel, half of them in each list
   int max_depth = 4;       // path segments after the camera ray
   uint64_t seed = 0;
   uint32_t generation = 0;  // another one gives other points and directions

@@ -1,0 +1,340 @@
+// The fit as a whole: what it finds, what it leaves alone, that it repeats, resumes and stops; and the parts
+// it is made of.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "patina/base/error.h"
+#include "patina/base/parallel.h"
+#include "patina/base/random.h"
+#include "patina/image/color.h"
+#include "patina/inverse/fit.h"
+#include "patina/inverse/light_packing.h"
+#include "patina/inverse/loss.h"
+#include "patina/inverse/texture_field.h"
+#include "recovery.h"
+#include "support.h"
+#include "worlds.h"
+
+namespace patina::test {
+namespace {
+
+// A world whose target is its own render; materials then start flat.
+struct Task {
+  World world;
+  views::ViewSet views;
+  std::vector<Image> edited;
+};
+Task make_task(int resolution = 40) {
+  Task task{make_world(Lighting::kConstant, 8, resolution), {}, {}};
+  task.views = view_of(task.world);
+  render::PathOptions path;
+  path.samples_per_pixel = 64;
+  task.edited.push_back(tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f));
+  auto flat = task.world.maps;
+  for (auto& maps : flat) {
+    maps.base_color.texels = Image(8, 8, 3, 0.5f);
+    maps.roughness.texels = Image(1, 1, 1, 0.5f);
+  }
+  task.world.scene.set_asset_materials(flat);
+  return task;
+}
+inverse::FitOptions quick() {
+  inverse::FitOptions options;
+  options.iterations = 24;
+  options.light_samples = 16;
+  options.max_depth = 2;
+  return options;
+}
+
+std::vector<float> all_texels(const inverse::FitResult& result) {
+  std::vector<float> values;
+  for (const auto& maps : result.maps)
+    for (const auto slot : inverse::kSlots) {
+      const auto& pixels = inverse::slot_map(maps, slot).texels.pixels;
+      values.insert(values.end(), pixels.begin(), pixels.end());
+    }
+  return values;
+}
+
+double base_color_error(const std::vector<asset::MaterialMaps>& maps, const Task& task,
+                        const inverse::FitResult& result) {
+  double error = 0, weight = 0;
+  for (size_t m = 0; m < 2; ++m)
+    for (size_t i = 0; i < result.evidence[m].pixels.size(); ++i) {
+      if (result.evidence[m].pixels[i] < 1.0f) continue;
+      for (size_t c = 0; c < 3; ++c) {
+        error += std::abs(maps[m].base_color.texels.pixels[3 * i + c] -
+                          task.world.maps[m].base_color.texels.pixels[3 * i + c]);
+        weight += 1;
+      }
+    }
+  return error / weight;
+}
+
+TEST(fit, finds_base_colour_from_one_view) {
+  Task task = make_task(64);
+  const auto start = task.world.scene.materials();
+  inverse::FitOptions options = quick();
+  options.iterations = 80;
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  const double before = base_color_error(start, task, result),
+               after = base_color_error(result.maps, task, result);
+  EXPECT_LT(after, 0.5 * before) << before << " -> " << after;
+  EXPECT_GT(result.psnr, 25.0f);
+  ASSERT_EQ(static_cast<int>(result.loss.size()), options.iterations);
+  EXPECT_TRUE(result.changed[0].base_color && result.changed[0].roughness && result.changed[0].normal);
+  EXPECT_FALSE(result.changed[0].metallic);
+}
+
+TEST(fit, is_the_same_for_any_number_of_threads) {
+  std::vector<std::vector<float>> results;
+  for (const int threads : {1, 2}) {
+    set_num_threads(threads);
+    Task task = make_task();
+    results.push_back(
+        all_texels(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {})));
+  }
+  set_num_threads(0);
+  EXPECT_TRUE(results[0] == results[1]);
+}
+
+TEST(fit, resumed_run_gives_the_same_bytes) {
+  Task whole = make_task();
+  const auto expected =
+      all_texels(inverse::fit_materials(whole.world.scene, whole.views, whole.edited, quick(), {}, {}));
+
+  // Killed in the middle of a light cache's life, with the checkpoint of that iteration at hand.
+  for (const int stop_at : {7, 12}) {
+    Task task = make_task();
+    std::optional<inverse::FitCheckpoint> saved;
+    inverse::FitHooks hooks;
+    hooks.every_iterations = 1;
+    hooks.on_checkpoint = [&](const inverse::FitCheckpoint& checkpoint) {
+      if (checkpoint.next_iteration == stop_at) saved = checkpoint;
+    };
+    Progress progress;
+    progress.stop_requested = [&] { return saved.has_value(); };
+    EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, progress),
+                 Error);
+    ASSERT_TRUE(saved.has_value());
+
+    Task again = make_task();
+    hooks = {};
+    hooks.resume = saved;
+    const auto result =
+        inverse::fit_materials(again.world.scene, again.views, again.edited, quick(), hooks, {});
+    EXPECT_TRUE(all_texels(result) == expected) << "stopped at " << stop_at;
+  }
+}
+
+TEST(fit, refuses_a_checkpoint_of_other_textures) {
+  Task task = make_task();
+  inverse::FitHooks hooks;
+  hooks.resume = inverse::FitCheckpoint{3, std::vector<uint8_t>(100)};
+  EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, {}), Error);
+}
+
+TEST(fit, changes_only_the_chosen_materials_and_maps) {
+  Task task = make_task();
+  const auto start = task.world.scene.materials();
+  inverse::FitOptions options = quick();
+  options.materials = {true, false};
+  options.fit_normal = false;
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  EXPECT_NE(result.maps[0].base_color.texels.pixels, start[0].base_color.texels.pixels);
+  EXPECT_EQ(result.maps[0].normal.texels.pixels, start[0].normal.texels.pixels);
+  EXPECT_EQ(result.maps[1].base_color.texels.pixels, start[1].base_color.texels.pixels);
+  EXPECT_FALSE(result.changed[1].any());
+}
+
+TEST(fit, leaves_surface_that_no_view_saw_as_it_was) {
+  Task task = make_task();
+  // Masks hide the left half of the picture.
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 20; ++x) task.views.views[0].gbuffer.material[static_cast<size_t>(y * 40 + x)] = -1;
+  const auto start = task.world.scene.materials();
+  inverse::FitOptions options = quick();
+  options.texture_size = 32;
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  const asset::Map before = asset::resized(start[0].base_color, 32, 32);
+  // The floor's u runs from left to right: its left third is hidden, with a margin for the rim of bilinear
+  // look-ups.
+  size_t moved_right = 0;
+  for (int y = 8; y < 24; ++y)
+    for (int x = 3; x < 32; ++x) {
+      const bool same = result.maps[0].base_color.texels.rgb(x, y) == before.texels.rgb(x, y);
+      if (x < 8) {
+        EXPECT_TRUE(same) << x << " " << y;
+      }
+      if (x > 20 && !same) ++moved_right;
+    }
+  EXPECT_GT(moved_right, 100u);
+}
+
+TEST(fit, gives_slots_without_texture_one_that_the_views_resolve) {
+  Task task = make_task();
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {});
+  EXPECT_GE(result.maps[0].roughness.texels.width, 16);
+  EXPECT_LE(result.maps[0].roughness.texels.width, 64);
+  inverse::FitOptions options = quick();
+  options.texture_size = 48;
+  Task sized = make_task();
+  const auto exact = inverse::fit_materials(sized.world.scene, sized.views, sized.edited, options, {}, {});
+  for (const auto slot : {inverse::Slot::kBaseColor, inverse::Slot::kRoughness, inverse::Slot::kNormal})
+    EXPECT_EQ(inverse::slot_map(exact.maps[0], slot).texels.width, 48);
+  EXPECT_EQ(exact.maps[0].metallic.texels.width, 8);
+}
+
+TEST(fit, keeps_every_value_in_range) {
+  Task task = make_task();
+  for (float& value : task.edited[0].pixels)
+    value = value > 0.4f ? 1.0f : 0.0f;  // no material looks like this
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {});
+  for (const auto& maps : result.maps) {
+    for (const float v : maps.base_color.texels.pixels) EXPECT_TRUE(v >= 0.0f && v <= 1.0f) << v;
+    for (const float v : maps.roughness.texels.pixels) EXPECT_TRUE(v >= 0.03f && v <= 1.0f) << v;
+    for (size_t i = 0; i < maps.normal.texels.num_pixels(); ++i) {
+      const vec3 n(maps.normal.texels.pixels[3 * i], maps.normal.texels.pixels[3 * i + 1],
+                   maps.normal.texels.pixels[3 * i + 2]);
+      EXPECT_GT(n.z, 0.0f);
+      EXPECT_NEAR(glm::length(n), 1.0f, 1e-4f);
+    }
+  }
+}
+
+TEST(fit, refuses_views_of_another_size) {
+  Task task = make_task();
+  task.edited[0] = Image(10, 10, 3);
+  EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {}), Error);
+  task.edited.clear();
+  EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {}), Error);
+}
+
+TEST(loss, derivative_agrees_with_central_differences) {
+  for (const float radiance : {0.001f, 0.05f, 0.6f, 4.0f, 50.0f})
+    for (const float target : {0.0f, 0.3f, 0.95f}) {
+      const vec3 at(radiance, 0.5f * radiance, 2.0f * radiance), goal(target, 0.2f, 0.8f);
+      const float gain = 1.7f;
+      const inverse::PixelLoss loss = inverse::relative_l2(at, at, goal, gain);
+      for (int c = 0; c < 3; ++c) {
+        // The definition in double, its denominator held at the present value.
+        const auto value = [&](double x) {
+          const double mapped = gain * x / (1 + gain * x),
+                       now = std::max(gain * at[c] / (1.0 + gain * at[c]), double{goal[c]});
+          return (mapped - goal[c]) * (mapped - goal[c]) / (3 * (now * now + inverse::kLossEpsilon));
+        };
+        const double h = 1e-4 * at[c];
+        const double numeric = (value(at[c] + h) - value(at[c] - h)) / (2 * h);
+        EXPECT_NEAR(loss.d_radiance_a[c] + loss.d_radiance_b[c], numeric, 1e-3 * std::abs(numeric) + 1e-5);
+      }
+    }
+}
+
+TEST(loss, weight_is_zero_near_silhouettes_and_falls_at_grazing_angles) {
+  views::GBuffer g;
+  g.width = g.height = 20;
+  g.material.assign(400, -1);
+  g.view_cosine.assign(400, 1.0f);
+  g.depth.assign(400, 5.0f);
+  g.p_world.resize(400);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 20; ++x) {
+      const auto i = static_cast<size_t>(20 * y + x);
+      g.p_world[i] = {0.1f * static_cast<float>(x), 0.1f * static_cast<float>(y), -5.0f};
+      if (x >= 4) g.material[i] = 0;
+      if (x >= 17) g.view_cosine[i] = 0.25f;
+      if (y >= 10 && x >= 4) g.depth[i] = 9.0f, g.p_world[i].z = -9.0f;  // a step in depth
+    }
+  const Image weight = inverse::loss_weight(g, {true}, 3);
+  EXPECT_EQ(*weight.at(3, 4), 0.0f);
+  EXPECT_EQ(*weight.at(6, 4), 0.0f);  // three pixels from the last one outside
+  EXPECT_EQ(*weight.at(7, 4), 1.0f);
+  EXPECT_EQ(*weight.at(10, 9), 0.0f);
+  EXPECT_EQ(*weight.at(10, 7), 0.0f);
+  EXPECT_EQ(*weight.at(10, 6), 1.0f);
+  EXPECT_EQ(*weight.at(10, 12), 0.0f);
+  EXPECT_EQ(*weight.at(10, 13), 1.0f);
+  EXPECT_FLOAT_EQ(*weight.at(18, 4), 0.5f);
+  const Image other = inverse::loss_weight(g, {false}, 3);
+  for (const float w : other.pixels) EXPECT_EQ(w, 0.0f);
+}
+
+TEST(texture_field, restriction_is_the_adjoint_of_composition) {
+  for (const auto wrap : {asset::Wrap::kRepeat, asset::Wrap::kClampToEdge, asset::Wrap::kMirroredRepeat}) {
+    asset::Map map;
+    map.wrap_s = wrap;
+    map.wrap_t = asset::Wrap::kRepeat;
+    inverse::TextureField field = inverse::make_field(map, 37, 20, 2);
+    RandomStream random(1, RandomPurpose::kTest, 5);
+    for (Image& level : field.levels)
+      for (float& value : level.pixels) value = random.uniform() - 0.5f;
+    inverse::compose(field);
+    Image y(37, 20, 2);
+    for (float& value : y.pixels) value = random.uniform() - 0.5f;
+    const std::vector<Image> adjoint = inverse::restrict_to_levels(field, y);
+    double left = 0, right = 0;
+    for (size_t i = 0; i < y.pixels.size(); ++i)
+      left += static_cast<double>(field.delta.texels.pixels[i]) * y.pixels[i];
+    for (size_t level = 0; level < adjoint.size(); ++level)
+      for (size_t i = 0; i < adjoint[level].pixels.size(); ++i)
+        right += static_cast<double>(adjoint[level].pixels[i]) * field.levels[level].pixels[i];
+    EXPECT_NEAR(left, right, 1e-4 * (1 + std::abs(left)));
+  }
+}
+
+TEST(texture_field, splatting_is_the_adjoint_of_sampling) {
+  const World world = make_world(Lighting::kConstant, 8, 8);
+  RandomStream random(1, RandomPurpose::kTest, 6);
+  inverse::TexelGradients adjoint = inverse::zero_gradients(world.maps, 2);
+  double left = 0;
+  for (int k = 0; k < 200; ++k) {
+    inverse::MaterialPoint point;
+    point.material = static_cast<uint16_t>(k % 2);
+    for (vec2& uv : point.uv) uv = 4.0f * random.uniform2() - 2.0f;
+    const inverse::MapValues value = inverse::sample_maps(world.maps[point.material], point);
+    const inverse::MapGradient w{vec3(random.uniform()), random.uniform(), random.uniform(),
+                                 vec3(random.uniform(), 0.3f, -0.4f)};
+    left += glm::dot(value.base_color, w.base_color) + value.roughness * w.roughness +
+            value.metallic * w.metallic + glm::dot(value.normal, w.normal);
+    inverse::splat(adjoint, world.maps[point.material], point, w);
+  }
+  double right = 0;
+  for (size_t m = 0; m < 2; ++m)
+    for (const auto slot : inverse::kSlots) {
+      const Image& texels = inverse::slot_map(world.maps[m], slot).texels;
+      const Image& gradient = adjoint.slots[m][static_cast<size_t>(slot)];
+      for (size_t i = 0; i < texels.pixels.size(); ++i)
+        right += static_cast<double>(texels.pixels[i]) * gradient.pixels[i];
+    }
+  EXPECT_NEAR(left, right, 1e-5 * std::abs(left));
+}
+
+TEST(texture_field, dilation_fills_from_the_nearest_and_stops) {
+  asset::Map map;
+  map.wrap_s = map.wrap_t = asset::Wrap::kClampToEdge;
+  map.texels = Image(9, 1, 1, 7.0f);
+  Image valid(9, 1, 1);
+  valid.pixels[4] = 1.0f;
+  map.texels.pixels[4] = 3.0f;
+  const Image filled = inverse::dilated(map, valid, 2);
+  const std::vector<float> expected{0, 0, 3, 3, 3, 3, 3, 0, 0};
+  EXPECT_EQ(filled.pixels, expected);
+}
+
+TEST(light_packing, keeps_direction_and_radiance) {
+  RandomStream random(2, RandomPurpose::kTest, 1);
+  for (int k = 0; k < 10000; ++k) {
+    const float z = 2.0f * random.uniform() - 1.0f, phi = 6.2831853f * random.uniform();
+    const vec3 d(std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z);
+    ASSERT_LT(glm::length(inverse::unpack_direction(inverse::pack_direction(d)) - d), 1e-4f);
+    const vec3 rgb = vec3(random.uniform(), random.uniform(), random.uniform()) *
+                     std::exp2(40.0f * random.uniform() - 20.0f);
+    const vec3 error = inverse::unpack_radiance(inverse::pack_radiance(rgb)) - rgb;
+    ASSERT_LE(max_component(glm::abs(error)), 0.0041f * max_component(rgb));
+  }
+  EXPECT_EQ(inverse::unpack_radiance(inverse::pack_radiance(vec3(0.0f))), vec3(0.0f));
+}
+
+}  // namespace
+}  // namespace patina::test

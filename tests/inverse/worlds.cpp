@@ -1,0 +1,122 @@
+#include "worlds.h"
+
+#include "patina/base/random.h"
+
+namespace patina::test {
+namespace {
+
+asset::Primitive square_of(const std::string& name, int material, const vec3& corner, const vec3& u,
+                           const vec3& v) {
+  asset::Primitive p;
+  p.name = name;
+  p.material = material;
+  const vec3 n = glm::normalize(glm::cross(u, v));
+  for (const vec2 st : {vec2(0, 0), vec2(1, 0), vec2(1, 1), vec2(0, 1)}) {
+    p.p_world.push_back(corner + st.x * u + st.y * v);
+    p.n_world.push_back(n);
+    p.tangent_world.emplace_back(glm::normalize(u), 1.0f);
+  }
+  p.uv = {{{0.05f, 0.05f}, {0.95f, 0.05f}, {0.95f, 0.95f}, {0.05f, 0.95f}}};
+  p.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return p;
+}
+
+// Random texels between low and high, the same for every run.
+asset::Map random_map(int size, int channels, float low, float high, uint64_t index) {
+  asset::Map map;
+  map.texels = Image(size, size, channels);
+  RandomStream random(7, RandomPurpose::kTest, index);
+  for (float& value : map.texels.pixels) value = low + (high - low) * random.uniform();
+  return map;
+}
+
+asset::MaterialMaps random_material(int size, uint64_t index) {
+  asset::MaterialMaps maps;
+  maps.base_color = random_map(size, 3, 0.2f, 0.8f, 10 * index);
+  maps.roughness = random_map(size, 1, 0.35f, 0.7f, 10 * index + 1);
+  maps.metallic = random_map(size, 1, 0.2f, 0.6f, 10 * index + 2);
+  maps.normal = random_map(size, 3, -0.15f, 0.15f, 10 * index + 3);
+  for (size_t i = 2; i < maps.normal.texels.pixels.size(); i += 3) maps.normal.texels.pixels[i] = 1.0f;
+  for (size_t i = 0; i < maps.normal.texels.pixels.size(); i += 3) {
+    float* n = maps.normal.texels.pixels.data() + i;
+    const vec3 unit = glm::normalize(vec3(n[0], n[1], n[2]));
+    n[0] = unit.x, n[1] = unit.y, n[2] = unit.z;
+  }
+  maps.alpha.texels = Image(1, 1, 1, 1.0f);
+  maps.emission.texels = Image(1, 1, 3, 0.0f);
+  return maps;
+}
+
+}  // namespace
+
+const char* name_of(Lighting lighting) {
+  switch (lighting) {
+    case Lighting::kConstant:
+      return "constant environment";
+    case Lighting::kStudio:
+      return "studio environment";
+    case Lighting::kPoint:
+      return "point light";
+    case Lighting::kEmitter:
+      break;
+  }
+  return "emitter";
+}
+
+World make_world(Lighting lighting, int texture_size, int resolution, render::BsdfModel model) {
+  auto asset = std::make_unique<asset::Asset>();
+  asset->primitives = {square_of("floor", 0, {-1, 0, 1}, {2, 0, 0}, {0, 0, -2}),
+                       square_of("wall", 1, {-1, 0, -1}, {2, 0, 0}, {0, 2, 0})};
+  std::vector<asset::MaterialMaps> maps = {random_material(texture_size, 1),
+                                           random_material(texture_size, 2)};
+  render::Environment environment = render::constant_environment(vec3(0.0f));
+  switch (lighting) {
+    case Lighting::kConstant:
+      environment = render::constant_environment({0.8f, 1.0f, 1.2f});
+      break;
+    case Lighting::kStudio:
+      environment = render::studio_environment();
+      break;
+    case Lighting::kPoint: {
+      asset::Light light;
+      light.p_world = {0.5f, 1.5f, 0.6f};
+      light.intensity = 4.0f;
+      asset->lights.push_back(light);
+      break;
+    }
+    case Lighting::kEmitter:
+      asset->primitives.push_back(square_of("lamp", 2, {-0.4f, 1.8f, 0.2f}, {0.8f, 0, 0}, {0, 0, 0.6f}));
+      maps.push_back(random_material(1, 3));
+      maps.back().emission.texels = Image(1, 1, 3, 5.0f);
+      break;
+  }
+  asset->materials.resize(maps.size());
+  render::Scene::Options options;
+  options.bsdf_model = model;
+  render::Scene scene(*asset, maps, std::move(environment), nullptr, options);
+  return {std::move(asset), std::move(maps), std::move(scene),
+          render::look_at({0.6f, 1.4f, 3.0f}, {0.0f, 0.5f, 0.0f}, 0.7f, resolution, resolution)};
+}
+
+views::ViewSet view_of(const World& world) {
+  views::ViewSet views;
+  views.grid = 1;
+  views.views.resize(1);
+  views.views[0].camera = world.camera;
+  views.views[0].gbuffer = views::make_gbuffer(world.scene, world.camera);
+  return views;
+}
+
+std::vector<inverse::CachePixel> all_pixels(const views::ViewSet& views) {
+  const views::GBuffer& g = views.views[0].gbuffer;
+  std::vector<inverse::CachePixel> pixels;
+  for (int y = 0; y < g.height; ++y)
+    for (int x = 0; x < g.width; ++x) {
+      const int material = g.material[static_cast<size_t>(y * g.width + x)];
+      if (material == 0 || material == 1)
+        pixels.push_back({0, static_cast<uint16_t>(x), static_cast<uint16_t>(y), 1.0f, vec3(0.0f)});
+    }
+  return pixels;
+}
+
+}  // namespace patina::test

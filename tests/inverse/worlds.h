@@ -1,0 +1,33 @@
+// Small scenes for the tests of inverse rendering: a corner of two textured squares that light each other,
+// under the kinds of light that a scene can have.
+#pragma once
+
+#include "patina/inverse/light_cache.h"
+#include "patina/render/scene.h"
+#include "patina/views/view_set.h"
+
+namespace patina::test {
+
+enum class Lighting { kConstant, kStudio, kPoint, kEmitter };
+inline constexpr Lighting kAllLighting[] = {Lighting::kConstant, Lighting::kStudio, Lighting::kPoint,
+                                            Lighting::kEmitter};
+const char* name_of(Lighting lighting);
+
+/// A floor (material 0) and a wall (material 1), each with maps of texture_size² texels of smooth random
+/// values, and under kEmitter a glowing square (material 2) above.
+struct World {
+  std::unique_ptr<asset::Asset> asset;  // the scene refers to it
+  std::vector<asset::MaterialMaps> maps;
+  render::Scene scene;
+  render::Camera camera;
+};
+World make_world(Lighting lighting, int texture_size, int resolution,
+                 render::BsdfModel model = render::BsdfModel::kGltf);
+
+/// The camera's view with a G-buffer, all that the cache and the fit need.
+views::ViewSet view_of(const World& world);
+
+/// Every pixel that shows materials 0 or 1, weight one, target zero.
+std::vector<inverse::CachePixel> all_pixels(const views::ViewSet& views);
+
+}  // namespace patina::test
