@@ -19,8 +19,9 @@ std::shared_ptr<GivenOptions> add_options(CLI::App& command, unsigned stages,
     if (std::find(without.begin(), without.end(), option.name) != without.end()) continue;
     std::string names = "--" + option.name;
     for (const std::string& alias : option.aliases) names = alias + "," + names;
-    std::string help = option.help;
-    if (!option.default_text.empty()) help += fmt::format(" [{}]", option.default_text);
+    // const, since CLI11 takes a string that it may change for the variable that the option shall fill.
+    const std::string help =
+        option.default_text.empty() ? option.help : fmt::format("{} [{}]", option.help, option.default_text);
     // Values stay text here: the pipeline's list parses them, the same way wherever they come from.
     CLI::Option* cli = command.add_option(names, help)->group(option.group)->type_name(option.placeholder);
     cli->expected(1, option.is_list ? CLI::detail::expected_max_vector_size : 1);
