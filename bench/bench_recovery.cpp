@@ -76,6 +76,9 @@ int main(int argc, char** argv) {
               static_cast<double>(r.fit.loss.empty() ? 0 : r.fit.loss.back()));
   std::printf("targets %.1f s  fit %.1f s  peak memory %.0f MB\n", r.target_seconds, r.fit_seconds,
               static_cast<double>(usage.ru_maxrss) / 1024);
+  for (size_t i = 0; i < r.fit.loss.size(); i += std::max<size_t>(1, r.fit.loss.size() / 20))
+    std::printf("%s%.5f", i ? " " : "loss ", static_cast<double>(r.fit.loss[i]));
+  std::printf("\n");
   if (!out.empty()) {
     write_image(out / "views.png", test::view_strip(r, 0, 128));
     write_image(out / "views_side.png", test::view_strip(r, 3, 128));

@@ -1,6 +1,7 @@
 #include "patina/inverse/fit.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -18,9 +19,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// The light cache is traced this often in a fit, each time with new points and directions, so that no fixed
-// noise is fitted.
-constexpr int kGenerations = 8;
+// Iterations take turns over this many light caches, each with its own points and directions, and the oldest
+// is traced anew with the current materials kRefreshes times in a fit: no fixed noise is there long enough to
+// be fitted.
+constexpr int kCaches = 4;
+constexpr int kRefreshes = 16;
 // The prior on a fitted map. Each pyramid level holds detail of one size; `detail` is the cost of a texel's
 // squared coefficient at the finest level, in units of one fully weighted pixel's loss, a quarter of that a
 // level up, and so on: where the views say little, the smoother answer wins, while large areas move freely.
@@ -34,7 +37,7 @@ Prior prior_of(Slot slot) {
     case Slot::kBaseColor:
       return {0.3f, 0.05f, 1e-3f};
     case Slot::kRoughness:
-      return {1.0f, 0.1f, 0.02f};
+      return {1.0f, 0.1f, 2e-3f};
     case Slot::kMetallic:
       return {0.2f, 0.1f, 1e-3f};
     case Slot::kNormal:
@@ -185,12 +188,25 @@ int finest_level(const FitState& state, const FittedMap& map, int iterations) {
   return std::min(std::max(0, kCoarseLevels - stage), static_cast<int>(map.field.levels.size()) - 1);
 }
 
-// Full speed for the first half, then a cosine down to a twentieth: the last iterations average the noise
-// out.
+// Shares of the learning rate. What renders hardly depend on, or depend on through noise, must walk slowly:
+// Adam takes steps of one size whether the gradient is signal or noise.
+float rate_of(Slot slot) {
+  switch (slot) {
+    case Slot::kBaseColor:
+      return 1.0f;
+    case Slot::kRoughness:
+    case Slot::kMetallic:
+      return 0.7f;
+    case Slot::kNormal:
+      break;
+  }
+  return 0.15f;
+}
+
+// A cosine from full speed down to a fiftieth: the last iterations average the noise out.
 float learning_rate(const FitOptions& options, int iteration) {
   const float t = static_cast<float>(iteration) / static_cast<float>(std::max(1, options.iterations));
-  const float fall = 0.5f + 0.5f * std::cos(kPi * std::clamp(2.0f * t - 1.0f, 0.0f, 1.0f));
-  return options.learning_rate * (0.05f + 0.95f * fall);
+  return options.learning_rate * (0.02f + 0.98f * (0.5f + 0.5f * std::cos(kPi * t)));
 }
 
 void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
@@ -216,8 +232,8 @@ void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
         }
       AdamOptions adam;
       // Levels add up: with all of them in step, a texel moves at twice the rate that was asked for.
-      adam.learning_rate =
-          2.0f * learning_rate(options, state.next_iteration) / static_cast<float>(gradients.size());
+      adam.learning_rate = rate_of(map.slot) * 2.0f * learning_rate(options, state.next_iteration) /
+                           static_cast<float>(gradients.size());
       adam_step(map.field, gradients, finest_level(state, map, options.iterations), adam);
     }
   });
@@ -263,7 +279,9 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   scene.set_asset_materials(base);
   FitState state;
   state.fitted = make_fitted_maps(scene, views, pixels, options);
-  state.cache_parameters = state.best_parameters = parameters_of(state.fitted);
+  const Parameters untouched = parameters_of(state.fitted);
+  state.late_parameters = untouched;
+  state.cache_parameters.assign(kCaches, untouched);
   if (state.fitted.empty())
     progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
   if (hooks.resume) restore_checkpoint(state, *hooks.resume);
@@ -277,37 +295,46 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     cache_options.generation = generation;
     return build_cache(scene, views, pixels, base, cache_options, progress);
   };
-  const auto keep_if_best = [&](float loss) {
-    if (loss >= state.best_loss) return;
-    state.best_loss = loss;
-    state.best_parameters = parameters_of(state.fitted);
+  // Generation g lives in caches[g % kCaches]; the first kCaches are traced at the start, then one every
+  // `interval` iterations.
+  const int interval = std::max(1, (options.iterations + kRefreshes) / (kRefreshes + 1));
+  std::array<LightCache, kCaches> caches;
+  const auto renew = [&](int generation) {
+    const auto at = static_cast<size_t>(generation % kCaches);
+    caches[at] = {};  // the old one's memory serves the new one
+    caches[at] = trace_cache(static_cast<uint32_t>(generation));
   };
-
-  const int generation_length = std::max(1, (options.iterations + kGenerations - 1) / kGenerations);
-  LightCache cache;
-  if (state.next_iteration % generation_length != 0 && state.next_iteration < options.iterations) {
-    // Resumed within a generation: its cache was traced with the parameters of its beginning.
+  const bool has_work = !state.fitted.empty() && state.next_iteration < options.iterations;
+  if (has_work && state.next_iteration == 0) {
+    for (int generation = 0; generation < kCaches; ++generation) renew(generation);
+  } else if (has_work) {
+    // Resumed: each cache was traced with the parameters of its own beginning.
     const Parameters current = parameters_of(state.fitted);
-    set_parameters(state.fitted, state.cache_parameters);
-    cache = trace_cache(static_cast<uint32_t>(state.next_iteration / generation_length));
+    const int newest = kCaches - 1 + (state.next_iteration - 1) / interval;
+    for (int generation = newest - kCaches + 1; generation <= newest; ++generation) {
+      set_parameters(state.fitted, state.cache_parameters[static_cast<size_t>(generation % kCaches)]);
+      renew(generation);
+    }
     set_parameters(state.fitted, current);
   }
 
   auto last_checkpoint = Clock::now();
   while (!state.fitted.empty() && state.next_iteration < options.iterations) {
     progress.throw_if_stopped();
-    const bool new_generation = state.next_iteration % generation_length == 0;
+    const bool new_generation = state.next_iteration > 0 && state.next_iteration % interval == 0;
+    auto turn = static_cast<size_t>(state.next_iteration % kCaches);
     if (new_generation) {
-      cache = {};  // two would not fit where one does
-      state.cache_parameters = parameters_of(state.fitted);
-      cache = trace_cache(static_cast<uint32_t>(state.next_iteration / generation_length));
+      const int generation = kCaches - 1 + state.next_iteration / interval;
+      turn = static_cast<size_t>(generation % kCaches);
+      state.cache_parameters[turn] = parameters_of(state.fitted);
+      renew(generation);
     }
-    Evaluation evaluation = evaluate(cache, state.fitted, model, gain);
-    // Only a fresh cache judges the parameters without the noise that they were fitted to.
-    if (new_generation) keep_if_best(evaluation.loss);
+    Evaluation evaluation = evaluate(caches[turn], state.fitted, model, gain);
     step(state, evaluation, options);
     state.loss.push_back(evaluation.loss);
     ++state.next_iteration;
+    if (state.next_iteration == options.iterations * 3 / 4)
+      state.late_parameters = parameters_of(state.fitted);
     progress.update("fit", state.next_iteration, options.iterations);
 
     const std::chrono::duration<double> since = Clock::now() - last_checkpoint;
@@ -323,10 +350,18 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   // A cache that no iteration saw judges the end, and the result.
   FitResult result;
   if (!state.fitted.empty()) {
-    cache = {};
-    cache = trace_cache(kGenerations);
-    keep_if_best(evaluate(cache, state.fitted, model, gain).loss);
-    set_parameters(state.fitted, state.best_parameters);
+    caches = {};
+    const LightCache cache = trace_cache(kCaches + kRefreshes + 1);
+    // Losses of different caches differ by more than the last iterations win, so all candidates meet the same
+    // one.
+    Parameters best;
+    float best_loss = std::numeric_limits<float>::infinity();
+    for (const Parameters& candidate : {parameters_of(state.fitted), state.late_parameters, untouched}) {
+      set_parameters(state.fitted, candidate);
+      const float loss = evaluate(cache, state.fitted, model, gain).loss;
+      if (loss < best_loss) best = candidate, best_loss = loss;
+    }
+    set_parameters(state.fitted, best);
     result.psnr = psnr_of(cache, state.fitted, scene, edited, gain);
   }
   result.loss = std::move(state.loss);

@@ -83,8 +83,12 @@ std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::Material
         float* texel = texels.pixels.data() + i * static_cast<size_t>(texels.channels);
         const float* delta = change.texels.pixels.data() + i * static_cast<size_t>(fitted_channels);
         if (std::all_of(delta, delta + fitted_channels, [](float d) { return d == 0.0f; })) continue;
-        for (int c = 0; c < fitted_channels; ++c)
-          texel[c] = std::clamp(texel[c] + delta[c], range.low, range.high);
+        for (int c = 0; c < fitted_channels; ++c) {
+          const float stored = stored_from_value(map.slot, texel[c]) + delta[c];
+          // The bounds survive the way there and back only up to rounding.
+          const float value = value_from_stored(map.slot, std::clamp(stored, range.low, range.high));
+          texel[c] = map.slot == Slot::kBaseColor ? std::clamp(value, 0.0f, 1.0f) : value;
+        }
         if (map.slot == Slot::kNormal) {
           const vec3 n = glm::normalize(vec3(texel[0], texel[1], texel[2]));
           texel[0] = n.x, texel[1] = n.y, texel[2] = n.z;
@@ -118,9 +122,8 @@ FitCheckpoint make_checkpoint(const FitState& state) {
     for (const auto* images : {&map.field.levels, &map.field.first_moment, &map.field.second_moment})
       for (const Image& image : *images) write(image.pixels);
   }
-  each_parameter(write, state.cache_parameters);
-  each_parameter(write, state.best_parameters);
-  append(bytes, &state.best_loss, sizeof(float));
+  for (const Parameters& parameters : state.cache_parameters) each_parameter(write, parameters);
+  each_parameter(write, state.late_parameters);
   write(state.loss);
   return checkpoint;
 }
@@ -135,11 +138,9 @@ void restore_checkpoint(FitState& state, const FitCheckpoint& checkpoint) {
       for (Image& image : *images) read(image.pixels);
     compose(map.field);
   }
-  state.cache_parameters = parameters_of(state.fitted);
-  each_parameter(read, state.cache_parameters);
-  state.best_parameters = parameters_of(state.fitted);
-  each_parameter(read, state.best_parameters);
-  reader.read(&state.best_loss, sizeof(float));
+  for (Parameters& parameters : state.cache_parameters) each_parameter(read, parameters);
+  state.late_parameters = parameters_of(state.fitted);
+  each_parameter(read, state.late_parameters);
   state.loss.resize(static_cast<size_t>(std::max(0, state.next_iteration)));
   read(state.loss);
   reader.expect_end();

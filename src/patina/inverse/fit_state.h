@@ -58,10 +58,9 @@ void set_parameters(std::vector<FittedMap>& fitted, const Parameters& parameters
 struct FitState {
   int next_iteration = 0;
   std::vector<FittedMap> fitted;
-  Parameters cache_parameters;  // with which the present light cache was traced
-  Parameters best_parameters;
-  float best_loss = std::numeric_limits<float>::infinity();
-  std::vector<float> loss;  // per iteration
+  std::vector<Parameters> cache_parameters;  // with which each of the present light caches was traced
+  Parameters late_parameters;  // after three quarters of the iterations: a candidate beside the last ones
+  std::vector<float> loss;     // per iteration
 };
 
 FitCheckpoint make_checkpoint(const FitState& state);

@@ -36,7 +36,7 @@ std::vector<Image> restrict_to_levels(const TextureField& field, const Image& d_
 
 struct AdamOptions {
   float learning_rate = 0.02f;
-  float beta1 = 0.9f, beta2 = 0.95f;
+  float beta1 = 0.9f, beta2 = 0.98f;
   /// Added to √v, as a share of its root mean square over the level: texels that hardly any pixel sees then
   /// move in proportion to their gradient instead of at full speed.
   float relative_epsilon = 0.1f;
