@@ -35,9 +35,9 @@ struct Prior {
 Prior prior_of(Slot slot) {
   switch (slot) {
     case Slot::kBaseColor:
-      return {0.3f, 0.05f, 1e-3f};
+      return {1.0f, 0.05f, 1e-3f};
     case Slot::kRoughness:
-      return {1.0f, 0.1f, 2e-3f};
+      return {4.0f, 0.1f, 2e-3f};
     case Slot::kMetallic:
       return {0.2f, 0.1f, 1e-3f};
     case Slot::kNormal:
