@@ -5,6 +5,7 @@ set -u
 build="${1:?usage: scripts/run_tests.sh BUILD_DIR}"
 cd "$(dirname "$0")/.."
 
+export OMP_WAIT_POLICY=passive   # OpenMP's waiting threads sleep; spinning ones starve the tests beside them
 passed=0 failed=0 skipped=0
 shopt -s nullglob
 programs=("$build"/test_*)

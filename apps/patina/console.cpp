@@ -69,6 +69,7 @@ void Console::say(std::string_view text) {
 void Console::update(std::string_view task, double done, double total) {
   if (quiet_ || !(total > 0)) return;
   const Clock::time_point now = Clock::now();
+  if (task == task_ && done >= total && last_done_ >= total) return;  // said already
   if (task != task_ || done < last_done_) {
     finish();
     task_ = task;

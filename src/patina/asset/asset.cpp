@@ -67,7 +67,12 @@ Bounds bounds(const Asset& asset) {
   if (max_component(size) <= std::numeric_limits<float>::min())
     throw Error(ErrorCode::kFormat, asset.path.string(),
                 "all triangles lie in one point, so the scene has no size");
-  return {low, high};
+  Bounds box{low, high};
+  for (const Primitive& primitive : asset.primitives)
+    for (const uvec3& t : primitive.triangles)
+      for (int k = 0; k < 3; ++k)
+        box.sphere_radius = std::max(box.sphere_radius, glm::distance(box.center(), primitive.p_world[t[k]]));
+  return box;
 }
 
 void require_enhanceable(const Asset& asset) {
