@@ -35,8 +35,7 @@ vec3 sum_over_pixels(const inverse::LightCache& cache, render::BsdfModel model) 
     const auto& sample = cache.samples[s];
     if (!sample.hit) continue;
     const auto shading = inverse::shade_values(sample.point, sample.base);
-    for (size_t list = 0; list < 2; ++list)
-      sum += 0.5f * inverse::shade(model, sample, shading, cache.lights_of(s, list));
+    sum += inverse::shade(model, sample, shading, cache.lights_of(s));
   }
   return sum;
 }
@@ -123,10 +122,9 @@ TEST(light_cache, gradient_agrees_with_path_replay) {
         const auto& sample = cache.samples[s];
         if (!sample.hit || sample.point.material > 1) continue;
         const auto shading = inverse::shade_values(sample.point, sample.base);
-        for (size_t list = 0; list < 2; ++list)
-          inverse::splat(from_cache, world.maps[sample.point.material], sample.point,
-                         inverse::shade_adjoint(world.scene.bsdf_model(), sample, shading,
-                                                cache.lights_of(s, list), vec3(0.5f)));
+        inverse::splat(from_cache, world.maps[sample.point.material], sample.point,
+                       inverse::shade_adjoint(world.scene.bsdf_model(), sample, shading, cache.lights_of(s),
+                                              vec3(1.0f)));
       }
       add(cached, from_cache);
 

@@ -155,7 +155,7 @@ TEST(light_cache, gradients_agree_with_central_differences) {
           if (!sample.hit) continue;
           const auto shading = inverse::shade_values(sample.point, sample.base);
           inverse::splat(gradients, world.maps[sample.point.material], sample.point,
-                         inverse::shade_adjoint(model, sample, shading, cache.lights_of(s, 0), kAdjoint));
+                         inverse::shade_adjoint(model, sample, shading, cache.lights_of(s), kAdjoint));
         }
         for (const Parameter& parameter : kParameters) {
           const Direction direction = direction_of(world.maps, parameter);
@@ -176,7 +176,7 @@ TEST(light_cache, gradients_agree_with_central_differences) {
                   if (!sample.hit) continue;
                   const auto shading = inverse::shade_values(
                       sample.point, inverse::sample_maps(maps[sample.point.material], sample.point));
-                  sum += glm::dot(kAdjoint, inverse::shade(model, sample, shading, cache.lights_of(s, 0)));
+                  sum += glm::dot(kAdjoint, inverse::shade(model, sample, shading, cache.lights_of(s)));
                 }
                 return sum;
               },
@@ -199,10 +199,10 @@ TEST(light_cache, vector_shading_equals_the_reference) {
     const auto& sample = cache.samples[s];
     const auto shading = inverse::shade_values(sample.point, sample.base);
     const auto reference =
-        inverse::shade_reference(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s, 0), kAdjoint);
-    const vec3 radiance = inverse::shade(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s, 0));
+        inverse::shade_reference(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s), kAdjoint);
+    const vec3 radiance = inverse::shade(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s));
     const auto gradient =
-        inverse::shade_adjoint(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s, 0), kAdjoint);
+        inverse::shade_adjoint(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s), kAdjoint);
     ASSERT_LT(glm::length(radiance - reference.radiance), 1e-4f * (1e-3f + glm::length(reference.radiance)));
     const auto near = [](float a, float b) {
       return std::abs(a - b) <= 2e-3f * (std::abs(a) + std::abs(b)) + 1e-4f;

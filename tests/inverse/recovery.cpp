@@ -10,6 +10,10 @@
 namespace patina::test {
 namespace {
 
+// A texel counts as seen from a tenth of a fully weighted pixel on: the rim that a bilinear look-up just
+// touches says nothing.
+constexpr float kMinEvidence = 0.1f;
+
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -88,7 +92,7 @@ MapErrors map_errors(const Recovery& r, const std::vector<asset::MaterialMaps>& 
                                         : map.texels.pixels[i * static_cast<size_t>(map.texels.channels) + c];
   };
   for (size_t i = 0; i < evidence.pixels.size(); ++i) {
-    if (evidence.pixels[i] <= 0) continue;
+    if (evidence.pixels[i] < kMinEvidence) continue;
     count += 1;
     vec3 n_true, n;
     for (size_t c = 0; c < 3; ++c) {

@@ -27,7 +27,8 @@ struct Recovery {
 Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions& options,
                  const Progress& progress = {});
 
-/// How near maps are to the truth, over base-colour texels with evidence of the first material that has any.
+/// How near maps are to the truth, over base-colour texels of the first seen material that have evidence of
+/// at least a tenth of a pixel.
 struct MapErrors {
   double base_color_psnr = 0;  // dB, sRGB-encoded values, peak 1
   double roughness_mae = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "patina/base/check.h"
 #include "patina/base/parallel.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/shade.h"
@@ -86,13 +87,6 @@ void to_stored(MapGradient& gradient, const CurrentValues& current, float weight
   gradient.metallic = bounded(gradient.metallic, current.overshoot.metallic, weight);
 }
 
-void add(MapGradient& sum, const MapGradient& gradient) {
-  sum.base_color += gradient.base_color;
-  sum.roughness += gradient.roughness;
-  sum.metallic += gradient.metallic;
-  sum.normal += gradient.normal;
-}
-
 const float* slot_gradient(const MapGradient& gradient, Slot slot) {
   switch (slot) {
     case Slot::kBaseColor:
@@ -109,8 +103,11 @@ const float* slot_gradient(const MapGradient& gradient, Slot slot) {
 
 }  // namespace
 
-Evaluation evaluate(const LightCache& cache, std::span<const FittedMap> fitted, render::BsdfModel model,
-                    float gain) {
+Evaluation evaluate(const LightCache& cache, std::span<const vec3> other, std::span<const FittedMap> fitted,
+                    render::BsdfModel model, float gain) {
+  PATINA_CHECK_EQ(other.size(), cache.pixels.size());
+  Evaluation result;
+  result.radiance.resize(cache.pixels.size());
   const FieldTable table = table_of(fitted);
   std::vector<float> pixel_loss(cache.pixels.size());
   std::vector<MapGradient> gradients(cache.samples.size());
@@ -120,19 +117,16 @@ Evaluation evaluate(const LightCache& cache, std::span<const FittedMap> fitted, 
       const CachePixel& pixel = cache.pixels[i];
       const CurrentValues current = current_values(table, sample);
       const Shading shading = shade_values(sample.point, current.values);
-      const vec3 radiance_a = shade(model, sample, shading, cache.lights_of(i, 0));
-      const vec3 radiance_b = shade(model, sample, shading, cache.lights_of(i, 1));
-      const PixelLoss loss = relative_l2(radiance_a, radiance_b, pixel.target, gain);
+      const vec3 radiance = shade(model, sample, shading, cache.lights_of(i));
+      const PixelLoss loss = relative_l2(radiance, other[i], pixel.target, gain);
+      result.radiance[i] = radiance;
       pixel_loss[i] = pixel.weight * loss.value;
       gradients[i] =
-          shade_adjoint(model, sample, shading, cache.lights_of(i, 0), pixel.weight * loss.d_radiance_a);
-      add(gradients[i],
-          shade_adjoint(model, sample, shading, cache.lights_of(i, 1), pixel.weight * loss.d_radiance_b));
+          shade_adjoint(model, sample, shading, cache.lights_of(i), pixel.weight * loss.d_radiance);
       to_stored(gradients[i], current, pixel.weight);
     }
   });
 
-  Evaluation result;
   double loss = 0, weight = 0;
   for (size_t i = 0; i < pixel_loss.size(); ++i) loss += pixel_loss[i], weight += cache.pixels[i].weight;
   result.loss = weight > 0 ? static_cast<float>(loss / weight) : 0.0f;
@@ -170,8 +164,7 @@ std::vector<vec3> shade_pixels(const LightCache& cache, std::span<const FittedMa
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       const CacheSample& sample = cache.samples[i];
       const Shading shading = shade_values(sample.point, current_values(table, sample).values);
-      radiance[i] = 0.5f * (shade(model, sample, shading, cache.lights_of(i, 0)) +
-                            shade(model, sample, shading, cache.lights_of(i, 1)));
+      radiance[i] = shade(model, sample, shading, cache.lights_of(i));
     }
   });
   return radiance;

@@ -14,13 +14,15 @@ struct Evaluation {
   float loss = 0;  // weighted mean over pixels
   std::vector<Image>
       d_delta;  // per fitted map, shape of field.delta; derivative of the weighted *sum* over pixels
+  std::vector<vec3> radiance;  // of every pixel, [3] linear
 };
 
-/// Sums are taken in a fixed order: the result does not depend on the number of threads.
-Evaluation evaluate(const LightCache& cache, std::span<const FittedMap> fitted, render::BsdfModel model,
-                    float gain);
+/// `other`: radiance of the same pixels from other caches, against whose error this cache's is multiplied
+/// (relative_l2). Sums are taken in a fixed order: the result does not depend on the number of threads.
+Evaluation evaluate(const LightCache& cache, std::span<const vec3> other, std::span<const FittedMap> fitted,
+                    render::BsdfModel model, float gain);
 
-/// Radiance of every cache pixel (mean of its halves), [3] linear.
+/// Radiance of every cache pixel, [3] linear.
 std::vector<vec3> shade_pixels(const LightCache& cache, std::span<const FittedMap> fitted,
                                render::BsdfModel model);
 

@@ -55,11 +55,11 @@ float start_of(Slot slot) {
       return 0.0f;
     case Slot::kRoughness:
     case Slot::kMetallic:
-      return 0.2f;
+      return 0.05f;
     case Slot::kNormal:
       break;
   }
-  return 0.4f;
+  return 0.3f;
 }
 
 // The first twentieth of the iterations moves levels from a quarter of the finest size down, the second from
@@ -239,6 +239,17 @@ void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
   });
 }
 
+// Mean radiance of every pixel over all caches but one.
+std::vector<vec3> mean_of_others(const std::vector<std::vector<vec3>>& radiance, size_t left_out) {
+  std::vector<vec3> mean(radiance[0].size(), vec3(0.0f));
+  for (size_t k = 0; k < radiance.size(); ++k) {
+    if (k == left_out) continue;
+    for (size_t i = 0; i < mean.size(); ++i)
+      mean[i] += radiance[k][i] / static_cast<float>(radiance.size() - 1);
+  }
+  return mean;
+}
+
 float psnr_of(const LightCache& cache, std::span<const FittedMap> fitted, const render::Scene& scene,
               std::span<const Image> edited, float gain) {
   const std::vector<vec3> radiance = shade_pixels(cache, fitted, scene.bsdf_model());
@@ -282,6 +293,7 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   const Parameters untouched = parameters_of(state.fitted);
   state.late_parameters = untouched;
   state.cache_parameters.assign(kCaches, untouched);
+  state.cache_radiance.assign(kCaches, std::vector<vec3>(pixels.size(), vec3(0.0f)));
   if (state.fitted.empty())
     progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
   if (hooks.resume) restore_checkpoint(state, *hooks.resume);
@@ -306,7 +318,11 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   };
   const bool has_work = !state.fitted.empty() && state.next_iteration < options.iterations;
   if (has_work && state.next_iteration == 0) {
-    for (int generation = 0; generation < kCaches; ++generation) renew(generation);
+    for (int generation = 0; generation < kCaches; ++generation) {
+      renew(generation);
+      const auto at = static_cast<size_t>(generation);
+      state.cache_radiance[at] = shade_pixels(caches[at], state.fitted, model);
+    }
   } else if (has_work) {
     // Resumed: each cache was traced with the parameters of its own beginning.
     const Parameters current = parameters_of(state.fitted);
@@ -329,7 +345,9 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
       state.cache_parameters[turn] = parameters_of(state.fitted);
       renew(generation);
     }
-    Evaluation evaluation = evaluate(caches[turn], state.fitted, model, gain);
+    Evaluation evaluation =
+        evaluate(caches[turn], mean_of_others(state.cache_radiance, turn), state.fitted, model, gain);
+    state.cache_radiance[turn] = std::move(evaluation.radiance);
     step(state, evaluation, options);
     state.loss.push_back(evaluation.loss);
     ++state.next_iteration;
@@ -351,14 +369,16 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   FitResult result;
   if (!state.fitted.empty()) {
     caches = {};
-    const LightCache cache = trace_cache(kCaches + kRefreshes + 1);
+    const LightCache cache = trace_cache(kCaches + kRefreshes + 1),
+                     other = trace_cache(kCaches + kRefreshes + 2);
     // Losses of different caches differ by more than the last iterations win, so all candidates meet the same
     // one.
     Parameters best;
     float best_loss = std::numeric_limits<float>::infinity();
     for (const Parameters& candidate : {parameters_of(state.fitted), state.late_parameters, untouched}) {
       set_parameters(state.fitted, candidate);
-      const float loss = evaluate(cache, state.fitted, model, gain).loss;
+      const float loss =
+          evaluate(cache, shade_pixels(other, state.fitted, model), state.fitted, model, gain).loss;
       if (loss < best_loss) best = candidate, best_loss = loss;
     }
     set_parameters(state.fitted, best);

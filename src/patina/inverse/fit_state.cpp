@@ -123,6 +123,8 @@ FitCheckpoint make_checkpoint(const FitState& state) {
       for (const Image& image : *images) write(image.pixels);
   }
   for (const Parameters& parameters : state.cache_parameters) each_parameter(write, parameters);
+  for (const auto& radiance : state.cache_radiance)
+    append(bytes, radiance.data(), radiance.size() * sizeof(vec3));
   each_parameter(write, state.late_parameters);
   write(state.loss);
   return checkpoint;
@@ -139,6 +141,7 @@ void restore_checkpoint(FitState& state, const FitCheckpoint& checkpoint) {
     compose(map.field);
   }
   for (Parameters& parameters : state.cache_parameters) each_parameter(read, parameters);
+  for (auto& radiance : state.cache_radiance) reader.read(radiance.data(), radiance.size() * sizeof(vec3));
   state.late_parameters = parameters_of(state.fitted);
   each_parameter(read, state.late_parameters);
   state.loss.resize(static_cast<size_t>(std::max(0, state.next_iteration)));

@@ -59,6 +59,8 @@ struct FitState {
   int next_iteration = 0;
   std::vector<FittedMap> fitted;
   std::vector<Parameters> cache_parameters;  // with which each of the present light caches was traced
+  std::vector<std::vector<vec3>>
+      cache_radiance;          // of every pixel, as each cache showed it when it was last looked at
   Parameters late_parameters;  // after three quarters of the iterations: a candidate beside the last ones
   std::vector<float> loss;     // per iteration
 };

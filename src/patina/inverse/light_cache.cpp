@@ -43,17 +43,17 @@ std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<con
 LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
                        std::vector<CachePixel> pixels, const std::vector<asset::MaterialMaps>& base_maps,
                        const CacheOptions& options, const Progress& progress) {
-  const GatherOptions gather{std::max(1, options.light_samples / 2), options.max_depth};
+  const GatherOptions gather{std::max(1, options.light_samples), options.max_depth};
   LightCache cache;
   cache.pixels = std::move(pixels);
-  cache.lights_per_list = num_entries(scene, gather);
+  cache.lights_per_pixel = num_entries(scene, gather);
   cache.samples.resize(cache.pixels.size());
-  cache.lights.resize(2 * cache.pixels.size() * static_cast<size_t>(cache.lights_per_list));
+  cache.lights.resize(cache.pixels.size() * static_cast<size_t>(cache.lights_per_pixel));
 
   constexpr int64_t kPixelsPerTask = 64;
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
     progress.throw_if_stopped();
-    std::vector<IncidentLight> lights(static_cast<size_t>(cache.lights_per_list));
+    std::vector<IncidentLight> lights(static_cast<size_t>(cache.lights_per_pixel));
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       const CachePixel& pixel = cache.pixels[i];
       const render::Camera& camera = views.views[pixel.view].camera;
@@ -72,12 +72,10 @@ LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
       sample.base = sample_maps(is_context ? scene.materials()[material] : base_maps[material], sample.point);
       sample.emission = surface.emission;
       sample.hit = true;
-      for (size_t list = 0; list < 2; ++list) {
-        gather_light(scene, surface, -ray.direction, gather, random, lights);
-        PackedLight* packed = cache.lights.data() + (2 * i + list) * lights.size();
-        for (const IncidentLight& light : lights)
-          *packed++ = {pack_direction(light.wi), pack_radiance(light.weighted_radiance)};
-      }
+      gather_light(scene, surface, -ray.direction, gather, random, lights);
+      PackedLight* packed = cache.lights.data() + i * lights.size();
+      for (const IncidentLight& light : lights)
+        *packed++ = {pack_direction(light.wi), pack_radiance(light.weighted_radiance)};
     }
   });
   return cache;

@@ -36,23 +36,21 @@ struct CachePixel {
   vec3 target{0.0f};  // tone-mapped linear
 };
 
-/// Each pixel has two lists of lights, drawn independently: two estimates of the same radiance, see
-/// relative_l2.
 struct LightCache {
   std::vector<CachePixel> pixels;    // view by view, rows from the top
   std::vector<CacheSample> samples;  // [pixels]
-  std::vector<PackedLight> lights;   // [pixels, 2, lights_per_list]
-  int lights_per_list = 0;
+  std::vector<PackedLight> lights;   // [pixels, lights_per_pixel]
+  int lights_per_pixel = 0;
 
-  std::span<const PackedLight> lights_of(size_t pixel, size_t list) const {
-    const auto n = static_cast<size_t>(lights_per_list);
-    return {lights.data() + (2 * pixel + list) * n, n};
+  std::span<const PackedLight> lights_of(size_t pixel) const {
+    const auto n = static_cast<size_t>(lights_per_pixel);
+    return {lights.data() + pixel * n, n};
   }
   size_t bytes() const;
 };
 
 struct CacheOptions {
-  int light_samples = 32;  // directions a pixel, half of them in each list
+  int light_samples = 32;  // directions a pixel
   int max_depth = 4;       // path segments after the camera ray
   uint64_t seed = 0;
   uint32_t generation = 0;  // another one gives other points and directions

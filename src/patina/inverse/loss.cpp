@@ -33,15 +33,14 @@ bool is_depth_edge(const views::GBuffer& g, size_t a, size_t b) {
 
 }  // namespace
 
-PixelLoss relative_l2(const vec3& radiance_a, const vec3& radiance_b, const vec3& target, float gain) {
+PixelLoss relative_l2(const vec3& radiance, const vec3& other, const vec3& target, float gain) {
   PixelLoss loss;
   for (int c = 0; c < 3; ++c) {
-    const float a = reinhard(gain * radiance_a[c]), b = reinhard(gain * radiance_b[c]);
-    const float reference = std::max(0.5f * (a + b), target[c]);
+    const float mapped = reinhard(gain * radiance[c]), mapped_other = reinhard(gain * other[c]);
+    const float reference = std::max(mapped_other, target[c]);
     const float scale = 1.0f / (3.0f * (reference * reference + kLossEpsilon));
-    loss.value += scale * (a - target[c]) * (b - target[c]);
-    loss.d_radiance_a[c] = scale * (b - target[c]) * gain * d_reinhard(gain * radiance_a[c]);
-    loss.d_radiance_b[c] = scale * (a - target[c]) * gain * d_reinhard(gain * radiance_b[c]);
+    loss.value += scale * (mapped - target[c]) * (mapped_other - target[c]);
+    loss.d_radiance[c] = 2.0f * scale * (mapped_other - target[c]) * gain * d_reinhard(gain * radiance[c]);
   }
   return loss;
 }
