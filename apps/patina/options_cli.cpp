@@ -18,7 +18,8 @@ std::shared_ptr<GivenOptions> add_options(CLI::App& command, unsigned stages,
     if (stages != ~0u && option.stages != pipeline::kNoStage && !(option.stages & stages)) continue;
     if (std::find(without.begin(), without.end(), option.name) != without.end()) continue;
     std::string names = "--" + option.name;
-    for (const std::string& alias : option.aliases) names = alias + "," + names;
+    for (const std::string& alias : option.aliases)  // -p,--prompt but --guidance-scale,--cfg-scale
+      names = alias.starts_with("--") ? names + "," + alias : alias + "," + names;
     // const, since CLI11 takes a string that it may change for the variable that the option shall fill.
     const std::string help =
         option.default_text.empty() ? option.help : fmt::format("{} [{}]", option.help, option.default_text);

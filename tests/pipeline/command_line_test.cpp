@@ -48,7 +48,7 @@ TEST(CommandLine, wrong_usage_is_exit_code_2) {
   expect_refused(2, {kettle()}, {"--prompt"});
   expect_refused(2, {kettle(), "-p", "rust", "--views", "5"}, {"--views", "4, 9 or 16", "'5'"});
   expect_refused(2, {kettle(), "-p", "rust", "--strength", "1.5"}, {"--strength", "0.01 to 1"});
-  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "100"}, {"--resolution", "multiple of 8"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "100", "--bias", "0"}, {"--resolution", "multiple of 8"});
   expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "72", "--bias", "1"}, {"--resolution", "multiple of 64"});
   expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--material", "rubber duck"}, {"rubber duck", "it has"});
 }

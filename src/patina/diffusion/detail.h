@@ -72,7 +72,7 @@ struct DetailInputs {
 };
 
 struct DetailOptions {
-  std::string prompt, negative_prompt;
+  std::string prompt = {}, negative_prompt = {};
   int num_steps = 20;
   float guidance_scale = 7.5f;  // 1: no guidance, one evaluation a step
   float strength = 0.8f;        // (0,1]: share of the steps that is run [Meng2022]

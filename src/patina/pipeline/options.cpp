@@ -95,7 +95,7 @@ Option elevations_option() {
       .name = "elevation",
       .aliases = {},
       .group = "Views",
-      .placeholder = "DEGREES...",
+      .placeholder = "DEGREES",
       .help = "Height of the cameras over the horizon, degrees; several are used in turn around the orbit.",
       .default_text = "20",
       .stages = kRenderStage,
@@ -170,7 +170,7 @@ Option materials_option() {
   Option option{.name = "material",
                 .aliases = {},
                 .group = "Input and output",
-                .placeholder = "NAME...",
+                .placeholder = "NAME",
                 .help = "Only these materials may change, by the names that `patina info` shows.",
                 .default_text = "all with usable UVs",
                 .stages = kFitStage | kReportStage,
@@ -185,7 +185,7 @@ Option fit_option() {
       .name = "fit",
       .aliases = {},
       .group = "Inverse rendering",
-      .placeholder = "MAP...",
+      .placeholder = "MAP",
       .help =
           "Which maps may change: base_color, roughness, normal, metallic (separated by spaces or commas).",
       .default_text = "base_color roughness normal",
@@ -369,7 +369,7 @@ std::vector<Option> make_options() {
        .aliases = {},
        .group = views,
        .placeholder = "PIXELS",
-       .help = "Width and height of one view, pixels; a multiple of 8.",
+       .help = "Width and height of one view, pixels; a multiple of 64 (with --bias 0: of 8).",
        .stages = kRenderStage},
       64, 4096, [](Config & c) -> auto& { return c.orbit.resolution; }));
   add(elevations_option());
