@@ -80,10 +80,11 @@ int main(int argc, char** argv) {
     std::printf("%s%.5f", i ? " " : "loss ", static_cast<double>(r.fit.loss[i]));
   std::printf("\n");
   if (!out.empty()) {
-    write_image(out / "views.png", test::view_strip(r, 0, 128));
-    write_image(out / "views_side.png", test::view_strip(r, 3, 128));
-    const char* const names[] = {"base_color.png", "roughness.png", "metallic.png", "normal.png"};
-    for (int slot = 0; slot < 4; ++slot) write_image(out / names[slot], test::texture_strip(r, slot, 512));
+    write_image(out / "recovery_views.png", test::view_strip(r, 3, 256));
+    write_image(out / "recovery_base_color.png", test::texture_strip(r, 0, 384));
+    write_image(out / "recovery_roughness.png", test::texture_strip(r, 1, 384));
+    write_image(out / "recovery_metallic.png", test::texture_strip(r, 2, 384));
+    write_image(out / "recovery_normal.png", test::texture_strip(r, 3, 384));
   }
   return 0;
 }

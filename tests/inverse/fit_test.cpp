@@ -238,6 +238,7 @@ TEST(loss, weight_is_zero_near_silhouettes_and_falls_at_grazing_angles) {
   g.view_cosine.assign(400, 1.0f);
   g.depth.assign(400, 5.0f);
   g.p_world.resize(400);
+  g.n_geometric_world.assign(400, vec3(0, 0, 1));
   for (int y = 0; y < 20; ++y)
     for (int x = 0; x < 20; ++x) {
       const auto i = static_cast<size_t>(20 * y + x);

@@ -10,7 +10,7 @@ namespace patina::test {
 
 struct RecoveryOptions {
   int resolution = 256;           // pixels a side of each of nine views
-  int samples_per_pixel = 256;    // of the path-traced targets
+  int samples_per_pixel = 128;    // of the path-traced targets
   bool flatten_metallic = false;  // whether metallic starts at its mean too
   bool start_at_truth = false;    // nothing is flattened: how far does noise lead away from the answer?
   inverse::FitOptions fit;

@@ -37,13 +37,13 @@ Prior prior_of(Slot slot) {
     case Slot::kBaseColor:
       return {1.0f, 0.05f, 1e-3f};
     case Slot::kRoughness:
-      return {4.0f, 0.1f, 2e-3f};
+      return {2.0f, 0.1f, 2e-3f};
     case Slot::kMetallic:
       return {0.2f, 0.1f, 1e-3f};
     case Slot::kNormal:
       break;
   }
-  return {3.0f, 0.1f, 0.5f};
+  return {4.0f, 0.1f, 3.0f};
 }
 
 // Maps join one after the other, at these shares of the iterations: while a colour is far too bright, a
@@ -62,9 +62,9 @@ float start_of(Slot slot) {
   return 0.3f;
 }
 
-// The first twentieth of the iterations moves levels from a quarter of the finest size down, the second from
+// The first fiftieth of the iterations moves levels from a quarter of the finest size down, the second from
 // a half, the rest all.
-constexpr int kCoarseLevels = 2, kStages = 20;
+constexpr int kCoarseLevels = 2, kStages = 50;
 constexpr double kSecondsBetweenCheckpoints = 20;
 
 // Sizes a map without texture gets from what the views resolve.

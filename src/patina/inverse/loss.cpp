@@ -28,7 +28,13 @@ bool is_depth_edge(const views::GBuffer& g, size_t a, size_t b) {
   // Rounding may push a purely axial step below zero.
   const float lateral = std::sqrt(std::max(lateral_squared, 0.0f));
   const float cosine = std::max(std::min(g.view_cosine[a], g.view_cosine[b]), 0.05f);
-  return jump > 2.0f * lateral / cosine;
+  if (jump > 2.0f * lateral / cosine) return true;
+  // A small step between surfaces that face the same way leaves both tangent planes; a crease stays in one of
+  // them.
+  const vec3 step = g.p_world[b] - g.p_world[a];
+  const float off_plane = std::min(std::abs(glm::dot(step, g.n_geometric_world[a])),
+                                   std::abs(glm::dot(step, g.n_geometric_world[b])));
+  return off_plane > 0.8f * glm::length(step);
 }
 
 }  // namespace
