@@ -82,6 +82,21 @@ TEST(fit, finds_base_colour_from_one_view) {
                after = base_color_error(result.maps, task, result);
   EXPECT_LT(after, 0.5 * before) << before << " -> " << after;
   EXPECT_GT(result.psnr, 25.0f);
+
+  // The maps that were written look, path-traced, as the fit believed: what it shades is what it returns.
+  render::PathOptions path;
+  path.samples_per_pixel = 64;
+  const Image rendered = tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f);
+  const Image weight =
+      inverse::loss_weight(task.views.views[0].gbuffer, {true, true}, options.boundary_pixels);
+  double error = 0, count = 0;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      if (*weight.at(x, y) <= 0.0f) continue;
+      const vec3 d = rendered.rgb(x, y) - task.edited[0].rgb(x, y);
+      error += glm::dot(d, d) / 3.0f, count += 1;
+    }
+  EXPECT_GT(-10.0 * std::log10(error / count), result.psnr - 1.0f);
   ASSERT_EQ(static_cast<int>(result.loss.size()), options.iterations);
   EXPECT_TRUE(result.changed[0].base_color && result.changed[0].roughness && result.changed[0].normal);
   EXPECT_FALSE(result.changed[0].metallic);

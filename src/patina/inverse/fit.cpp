@@ -43,7 +43,7 @@ Prior prior_of(Slot slot) {
     case Slot::kNormal:
       break;
   }
-  return {4.0f, 0.1f, 3.0f};
+  return {4.0f, 0.1f, 6.0f};
 }
 
 // Maps join one after the other, at these shares of the iterations: while a colour is far too bright, a
@@ -196,7 +196,7 @@ float rate_of(Slot slot) {
       return 1.0f;
     case Slot::kRoughness:
     case Slot::kMetallic:
-      return 0.7f;
+      return 0.35f;
     case Slot::kNormal:
       break;
   }

@@ -1,5 +1,5 @@
 // Eight bytes for one incident direction and the light it carries: an octahedral direction of 2 × 16 bits
-// [Cigolle2014] and RGB with a shared exponent [glEXT_texture_shared_exponent].
+// [Cigolle2014] and RGB with a shared exponent [Ward1991].
 #pragma once
 
 #include <algorithm>
@@ -34,9 +34,9 @@ inline vec3 unpack_direction(uint32_t packed) {
   return d / std::sqrt(glm::dot(d, d));
 }
 
-/// Three non-negative floats → 9-bit mantissas and one 8-bit-biased 5-bit exponent would clip at 65408 and
-/// lose below 1e-7; Monte Carlo weights span more, so 8-bit mantissas (with rounding, ±0.2 % of the largest
-/// channel) and a full 8-bit exponent.
+/// Three non-negative floats share one 8-bit exponent; 8-bit mantissas keep each to 0.4 % of the largest.
+/// Monte Carlo weights span more than the 5-bit exponents of common GPU formats. Negative and not-a-number
+/// become zero.
 inline uint32_t pack_radiance(const vec3& rgb) {
   const float largest = std::max(rgb.x, std::max(rgb.y, rgb.z));
   if (!(largest > 1e-30f)) return 0;  // also NaN
