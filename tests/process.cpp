@@ -51,8 +51,10 @@ ProcessResult run_process(const std::vector<std::string>& arguments, const Proce
       if (sources[i].fd < 0 || !sources[i].revents) continue;
       std::array<char, 65536> buffer;
       const ssize_t n = ::read(sources[i].fd, buffer.data(), buffer.size());
-      if (n > 0) (i == 0 ? result.output : result.error).append(buffer.data(), static_cast<size_t>(n));
-      else sources[i].fd = -1;
+      if (n > 0)
+        (i == 0 ? result.output : result.error).append(buffer.data(), static_cast<size_t>(n));
+      else
+        sources[i].fd = -1;
     }
     const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!killed && elapsed > deadline) {

@@ -1,5 +1,5 @@
-// Every file of the collection of bad inputs through `patina info`: refused with one clear message or accepted as the manifest
-// says; no crash, no hang, no more memory than the file justifies.
+// Every file of the collection of bad inputs through `patina info`: refused with one clear message or
+// accepted as the manifest says; no crash, no hang, no more memory than the file justifies.
 #include <algorithm>
 #include <atomic>
 #include <fstream>
@@ -27,7 +27,7 @@ std::vector<Case> read_manifest() {
   std::ifstream file(shared_dir() / "bad-inputs" / "MANIFEST.tsv");
   std::vector<Case> cases;
   std::string line;
-  std::getline(file, line);   // headings
+  std::getline(file, line);  // headings
   while (std::getline(file, line)) {
     std::istringstream fields(line);
     Case c;
@@ -42,10 +42,13 @@ std::vector<Case> read_manifest() {
 // Everything that is wrong with how patina took this file; empty: nothing.
 std::string judge(const Case& c) {
   const std::string path = (shared_dir() / "bad-inputs" / c.path).string();
-  const ProcessResult result = run_process({built_program("patina").string(), "info", path}, {.seconds = kMaxSeconds});
+  const ProcessResult result =
+      run_process({built_program("patina").string(), "info", path}, {.seconds = kMaxSeconds});
   std::ostringstream faults;
-  if (result.signal) faults << " ended by signal " << result.signal;
-  else if (result.exit_code != 0 && result.exit_code != 1) faults << " exit code " << result.exit_code;
+  if (result.signal)
+    faults << " ended by signal " << result.signal;
+  else if (result.exit_code != 0 && result.exit_code != 1)
+    faults << " exit code " << result.exit_code;
   if (result.seconds > kMaxSeconds) faults << " took " << result.seconds << " s";
   if (result.peak_rss_mb > kMaxMemoryMb) faults << " took " << result.peak_rss_mb << " MB";
   if (c.expect == "reject" && result.exit_code == 0) faults << " accepted: " << result.output.substr(0, 200);
@@ -53,8 +56,10 @@ std::string judge(const Case& c) {
   if (result.exit_code == 1) {
     const std::string name = std::filesystem::path(c.path).filename().string();
     if (!result.error.starts_with("patina: ")) faults << " message: " << result.error.substr(0, 200);
-    if (result.error.find(name) == std::string::npos) faults << " message does not name the file: " << result.error.substr(0, 200);
-    if (result.error.find("internal error") != std::string::npos) faults << " " << result.error.substr(0, 200);
+    if (result.error.find(name) == std::string::npos)
+      faults << " message does not name the file: " << result.error.substr(0, 200);
+    if (result.error.find("internal error") != std::string::npos)
+      faults << " " << result.error.substr(0, 200);
     if (result.error.size() > 4000) faults << " message of " << result.error.size() << " bytes";
     if (!result.output.empty()) faults << " printed a result and failed";
   }
@@ -79,7 +84,8 @@ TEST(BadInputs, info_judges_every_file_as_the_manifest_says) {
       for (size_t i; (i = next.fetch_add(1)) < cases.size();)
         if (const std::string faults = judge(cases[i]); !faults.empty()) {
           const std::lock_guard lock(mutex);
-          ADD_FAILURE() << cases[i].path << " (" << cases[i].expect << ": " << cases[i].what << "):" << faults;
+          ADD_FAILURE() << cases[i].path << " (" << cases[i].expect << ": " << cases[i].what
+                        << "):" << faults;
         }
     });
   for (std::thread& thread : threads) thread.join();

@@ -1,4 +1,5 @@
-// The command line as a user meets it: help, exit codes, messages that say what to do, nothing left behind after a refusal.
+// The command line as a user meets it: help, exit codes, messages that say what to do, nothing left behind
+// after a refusal.
 #include <gtest/gtest.h>
 
 #include "patina/base/files.h"
@@ -16,11 +17,17 @@ ProcessResult patina(std::vector<std::string> arguments) {
   return run_process(arguments, {.seconds = 120});
 }
 
-std::string kettle() { return (data_dir().parent_path().parent_path() / "examples" / "kettle.glb").string(); }
-std::string model() { return (data_dir() / "tiny-sd").string(); }
+std::string kettle() {
+  return (data_dir().parent_path().parent_path() / "examples" / "kettle.glb").string();
+}
+std::string model() {
+  return (data_dir() / "tiny-sd").string();
+}
 
-// A run of `enhance` that must be refused with `exit_code`, a message that holds all of `words`, and no output.
-void expect_refused(int exit_code, std::vector<std::string> arguments, const std::vector<std::string>& words) {
+// A run of `enhance` that must be refused with `exit_code`, a message that holds all of `words`, and no
+// output.
+void expect_refused(int exit_code, std::vector<std::string> arguments,
+                    const std::vector<std::string>& words) {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out.glb";
   arguments.insert(arguments.begin(), "enhance");
@@ -28,15 +35,18 @@ void expect_refused(int exit_code, std::vector<std::string> arguments, const std
     arguments.insert(arguments.end(), {"-o", output.string()});
   const ProcessResult result = patina(arguments);
   EXPECT_EQ(result.exit_code, exit_code) << result.error;
-  for (const std::string& word : words) EXPECT_NE(result.error.find(word), std::string::npos) << "'" << word << "' is not in: " << result.error;
+  for (const std::string& word : words)
+    EXPECT_NE(result.error.find(word), std::string::npos) << "'" << word << "' is not in: " << result.error;
   EXPECT_FALSE(fs::exists(output));
 }
 
 TEST(CommandLine, help_explains_every_option) {
   const ProcessResult result = patina({"enhance", "--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const pipeline::Option& option : pipeline::options()) EXPECT_NE(result.output.find("--" + option.name), std::string::npos) << option.name;
-  for (const char* command : {"render", "detail", "fit", "report", "info"}) EXPECT_EQ(patina({command, "--help"}).exit_code, 0) << command;
+  for (const pipeline::Option& option : pipeline::options())
+    EXPECT_NE(result.output.find("--" + option.name), std::string::npos) << option.name;
+  for (const char* command : {"render", "detail", "fit", "report", "info"})
+    EXPECT_EQ(patina({command, "--help"}).exit_code, 0) << command;
   EXPECT_NE(patina({"--version"}).output.find("patina"), std::string::npos);
 }
 
@@ -48,9 +58,12 @@ TEST(CommandLine, wrong_usage_is_exit_code_2) {
   expect_refused(2, {kettle()}, {"--prompt"});
   expect_refused(2, {kettle(), "-p", "rust", "--views", "5"}, {"--views", "4, 9 or 16", "'5'"});
   expect_refused(2, {kettle(), "-p", "rust", "--strength", "1.5"}, {"--strength", "0.01 to 1"});
-  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "100", "--bias", "0"}, {"--resolution", "multiple of 8"});
-  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "72", "--bias", "1"}, {"--resolution", "multiple of 64"});
-  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--material", "rubber duck"}, {"rubber duck", "it has"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "100", "--bias", "0"},
+                 {"--resolution", "multiple of 8"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "72", "--bias", "1"},
+                 {"--resolution", "multiple of 64"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--material", "rubber duck"},
+                 {"rubber duck", "it has"});
 }
 
 TEST(CommandLine, missing_and_wrong_inputs_are_named) {
@@ -60,7 +73,8 @@ TEST(CommandLine, missing_and_wrong_inputs_are_named) {
   write_file(text, std::string_view("this is no asset"));
   expect_refused(1, {text.string(), "-p", "rust", "-m", model()}, {"text.glb"});
   expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--environment", text.string()}, {"text.glb"});
-  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--cameras", text.string()}, {"text.glb", "JSON"});
+  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--cameras", text.string()},
+                 {"text.glb", "JSON"});
   expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "--scene", text.string()}, {"text.glb"});
 }
 
@@ -69,14 +83,18 @@ TEST(CommandLine, wrong_models_are_refused_before_anything_is_rendered) {
   expect_refused(2, {kettle(), "-p", "rust"}, {"--model"});
   expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "none").string()}, {"none"});
   write_file(folder.path() / "model.ckpt", std::string_view("\x80\x02}q"));
-  expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "model.ckpt").string()}, {"model.ckpt", "code"});
+  expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "model.ckpt").string()},
+                 {"model.ckpt", "code"});
 }
 
 TEST(CommandLine, unwritable_output_is_refused_first) {
   const TemporaryFolder folder;
   write_file(folder.path() / "file", std::string_view("x"));
-  expect_refused(1, {kettle(), "-p", "rust", "-m", model(), "-o", (folder.path() / "file" / "out.glb").string()}, {"file"});
-  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "-o", (folder.path() / "out.fbx").string()}, {".glb"});
+  expect_refused(1,
+                 {kettle(), "-p", "rust", "-m", model(), "-o", (folder.path() / "file" / "out.glb").string()},
+                 {"file"});
+  expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "-o", (folder.path() / "out.fbx").string()},
+                 {".glb"});
 }
 
 TEST(CommandLine, a_config_file_holds_options_and_the_command_line_wins) {

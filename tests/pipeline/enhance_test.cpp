@@ -1,5 +1,5 @@
-// The whole way on the example asset with the small model of random weights: it writes what it promises, can be killed and
-// continued with the same bytes, and takes what an artist changed between two stages.
+// The whole way on the example asset with the small model of random weights: it writes what it promises, can
+// be killed and continued with the same bytes, and takes what an artist changed between two stages.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -15,13 +15,41 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path kettle() { return data_dir().parent_path().parent_path() / "examples" / "kettle.glb"; }
+fs::path kettle() {
+  return data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+}
 
 // Small, but every part real: four views, two evaluations with guidance and bias, a short fit.
 std::vector<std::string> enhance_command(const fs::path& output) {
-  return {built_program("patina").string(), "enhance", kettle().string(), "-p", "a rusty old kettle", "-n", "shiny", "-m",
-          (data_dir() / "tiny-sd").string(), "--views", "4", "--resolution", "64", "--samples", "8", "-s", "4", "--strength", "0.5",
-          "--bias", "1.2", "--fit-iterations", "12", "--texture-size", "128", "--turntable", "4", "-o", output.string()};
+  return {built_program("patina").string(),
+          "enhance",
+          kettle().string(),
+          "-p",
+          "a rusty old kettle",
+          "-n",
+          "shiny",
+          "-m",
+          (data_dir() / "tiny-sd").string(),
+          "--views",
+          "4",
+          "--resolution",
+          "64",
+          "--samples",
+          "8",
+          "-s",
+          "4",
+          "--strength",
+          "0.5",
+          "--bias",
+          "1.2",
+          "--fit-iterations",
+          "12",
+          "--texture-size",
+          "128",
+          "--turntable",
+          "4",
+          "-o",
+          output.string()};
 }
 
 ProcessResult run_ok(const std::vector<std::string>& command) {
@@ -57,8 +85,10 @@ TEST(Enhance, writes_asset_report_and_metrics) {
   const auto metrics = nlohmann::json::parse(read_text_file(run / "metrics.json"));
   EXPECT_GT(metrics.at("coverage").get<double>(), 0.3);
   EXPECT_LE(metrics.at("coverage").get<double>(), 1.0);
-  for (const char* name : {"mean", "variance", "autocorrelation", "ks_p"}) EXPECT_TRUE(metrics.at("noise").contains(name)) << name;
-  for (const char* name : {"edit_correlation", "edit_psnr"}) EXPECT_TRUE(metrics.at("consistency").contains(name)) << name;
+  for (const char* name : {"mean", "variance", "autocorrelation", "ks_p"})
+    EXPECT_TRUE(metrics.at("noise").contains(name)) << name;
+  for (const char* name : {"edit_correlation", "edit_psnr"})
+    EXPECT_TRUE(metrics.at("consistency").contains(name)) << name;
   EXPECT_GT(metrics.at("fit").at("psnr").get<double>(), metrics.at("fit").at("psnr_before").get<double>());
   EXPECT_TRUE(metrics.at("fit").contains("sharpness"));
   std::vector<std::string> stages;
@@ -69,7 +99,8 @@ TEST(Enhance, writes_asset_report_and_metrics) {
   EXPECT_EQ(stages, (std::vector<std::string>{"render", "detail", "fit", "report"}));
   EXPECT_GT(fs::file_size(run / "report.html"), 10000u);
   EXPECT_GT(fs::file_size(run / "turntable.webp"), 1000u);
-  EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "config.json")).at("options").at("prompt"), "a rusty old kettle");
+  EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "config.json")).at("options").at("prompt"),
+            "a rusty old kettle");
 }
 
 TEST(Enhance, a_killed_run_continues_and_gives_the_same_bytes) {
@@ -79,7 +110,7 @@ TEST(Enhance, a_killed_run_continues_and_gives_the_same_bytes) {
   int num_kills = 0;
   for (const double share : {0.25, 0.3, 0.35, 0.4, 0.45}) {
     const ProcessResult result = run_process(enhance_command(broken), {.kill_after = share * seconds});
-    if (result.signal == 0) break;   // it got through
+    if (result.signal == 0) break;  // it got through
     ++num_kills;
     EXPECT_FALSE(fs::exists(broken) && asset::read_asset(broken).primitives.empty());
   }
@@ -88,7 +119,8 @@ TEST(Enhance, a_killed_run_continues_and_gives_the_same_bytes) {
   EXPECT_EQ(hash_file(broken), hash_file(whole));
   for (int v = 0; v < 4; ++v) {
     const std::string name = "detail/edited_0" + std::to_string(v) + ".png";
-    EXPECT_EQ(hash_file(folder.path() / "whole.patina-run" / name), hash_file(folder.path() / "broken.patina-run" / name));
+    EXPECT_EQ(hash_file(folder.path() / "whole.patina-run" / name),
+              hash_file(folder.path() / "broken.patina-run" / name));
   }
 }
 
@@ -115,7 +147,8 @@ TEST(Enhance, takes_pictures_that_were_edited_between_two_stages) {
   for (int v = 0; v < 4; ++v) {
     const fs::path picture = run / ("detail/edited_0" + std::to_string(v) + ".png");
     Image image = read_image(picture);
-    for (size_t i = 0; i < image.num_pixels(); ++i) image.set_rgb(static_cast<int>(i) % image.width, static_cast<int>(i) / image.width, {0.6f, 0.1f, 0.1f});
+    for (size_t i = 0; i < image.num_pixels(); ++i)
+      image.set_rgb(static_cast<int>(i) % image.width, static_cast<int>(i) / image.width, {0.6f, 0.1f, 0.1f});
     write_image(picture, image);
   }
   run_ok({built_program("patina").string(), "fit", run.string()});

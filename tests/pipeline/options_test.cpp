@@ -70,7 +70,8 @@ TEST(Options, defaults_shown_are_the_defaults_used) {
 
 TEST(Options, a_value_out_of_range_names_option_range_and_value) {
   Config config;
-  const std::string message = message_of([&] { find_option("strength")->set(config, std::vector<std::string>{"1.5"}); });
+  const std::string message =
+      message_of([&] { find_option("strength")->set(config, std::vector<std::string>{"1.5"}); });
   EXPECT_NE(message.find("--strength"), std::string::npos) << message;
   EXPECT_NE(message.find("from 0.01 to 1"), std::string::npos) << message;
   EXPECT_NE(message.find("1.5"), std::string::npos) << message;
@@ -78,16 +79,28 @@ TEST(Options, a_value_out_of_range_names_option_range_and_value) {
 
 TEST(Options, refuses_what_is_no_number_or_no_choice) {
   Config config;
-  for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{{"steps", "ten"}, {"steps", "10.5"}, {"steps", ""},
-         {"views", "5"}, {"guidance-scale", "nan"}, {"scheduler", "magic"}, {"fit", "colour"}, {"exposure", "bright"}, {"seed", "-1"}}) {
-    EXPECT_THROW(find_option(name)->set(config, std::vector<std::string>{value}), Error) << name << " " << value;
+  for (const auto& [name, value] : std::vector<std::pair<std::string, std::string>>{{"steps", "ten"},
+                                                                                    {"steps", "10.5"},
+                                                                                    {"steps", ""},
+                                                                                    {"views", "5"},
+                                                                                    {"guidance-scale", "nan"},
+                                                                                    {"scheduler", "magic"},
+                                                                                    {"fit", "colour"},
+                                                                                    {"exposure", "bright"},
+                                                                                    {"seed", "-1"}}) {
+    EXPECT_THROW(find_option(name)->set(config, std::vector<std::string>{value}), Error)
+        << name << " " << value;
   }
-  EXPECT_NE(message_of([&] { find_option("scheduler")->set(config, std::vector<std::string>{"magic"}); }).find("unipc"), std::string::npos);
+  EXPECT_NE(message_of([&] {
+              find_option("scheduler")->set(config, std::vector<std::string>{"magic"});
+            }).find("unipc"),
+            std::string::npos);
 }
 
 TEST(Options, a_stage_depends_on_what_it_reads_and_on_nothing_else) {
   Config config;
-  const auto before_render = values_read_by(config, kRenderStage), before_detail = values_read_by(config, kDetailStage);
+  const auto before_render = values_read_by(config, kRenderStage),
+             before_detail = values_read_by(config, kDetailStage);
   set(config, "prompt", {"moss"});
   EXPECT_EQ(values_read_by(config, kRenderStage), before_render);
   EXPECT_NE(values_read_by(config, kDetailStage), before_detail);

@@ -1,4 +1,5 @@
-// The run folder: stages are skipped exactly when nothing changed, checkpoints belong to their inputs, one process owns it.
+// The run folder: stages are skipped exactly when nothing changed, checkpoints belong to their inputs, one
+// process owns it.
 #include "patina/pipeline/run_folder.h"
 
 #include <gtest/gtest.h>
@@ -74,7 +75,9 @@ TEST(RunFolder, remembers_stages_and_metrics_from_process_to_process) {
 TEST(RunFolder, a_failed_stage_leaves_no_record) {
   const test::TemporaryFolder folder;
   RunFolder run(folder.path() / "run");
-  EXPECT_THROW(run.run_stage("work", "key", {}, []() -> RunFolder::StageResult { throw Error(ErrorCode::kIo, "", "failed"); }), Error);
+  EXPECT_THROW(run.run_stage("work", "key", {},
+                             []() -> RunFolder::StageResult { throw Error(ErrorCode::kIo, "", "failed"); }),
+               Error);
   EXPECT_EQ(run.stage("work"), nullptr);
 }
 

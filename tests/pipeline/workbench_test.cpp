@@ -11,7 +11,8 @@ namespace {
 std::vector<render::Camera> four_cameras() {
   std::vector<render::Camera> cameras;
   for (int i = 0; i < 4; ++i)
-    cameras.push_back(render::look_at(vec3(std::sin(i * 1.5f), 0.3f, std::cos(i * 1.5f)), vec3(0), 0.6f, 64, 96));
+    cameras.push_back(
+        render::look_at(vec3(std::sin(i * 1.5f), 0.3f, std::cos(i * 1.5f)), vec3(0), 0.6f, 64, 96));
   return cameras;
 }
 

@@ -253,13 +253,15 @@ class GltfExporter {
     return num_images_++;
   }
 
-  void replace_image(size_t index, std::vector<uint8_t> bytes, const std::string& material, const std::string& slot_name) {
+  void replace_image(size_t index, std::vector<uint8_t> bytes, const std::string& material,
+                     const std::string& slot_name) {
     replaced_.push_back(index);
     Json image;
     if (to_glb_) {
       image = {{"bufferView", add_view(bytes)}, {"mimeType", "image/png"}, {"uri", nullptr}};
     } else {
-      image = {{"uri", percent_encoded(sidecars_.add_texture(material, slot_name, std::move(bytes)))}, {"bufferView", nullptr}};
+      image = {{"uri", percent_encoded(sidecars_.add_texture(material, slot_name, std::move(bytes)))},
+               {"bufferView", nullptr}};
       if (root_["images"][index].contains("mimeType")) image["mimeType"] = "image/png";
     }
     patch_["images"][std::to_string(index)] = std::move(image);
@@ -381,7 +383,8 @@ class GltfExporter {
   bool to_glb_;
   UseCounts uses_;
   SidecarFiles sidecars_;
-  JsonPatch patch_ = JsonPatch::object();  // members lie in a vector: no reference into it survives an insertion
+  JsonPatch patch_ =
+      JsonPatch::object();  // members lie in a vector: no reference into it survives an insertion
   size_t num_textures_, num_images_, num_views_, num_samplers_;
   std::vector<size_t> replaced_;
   std::vector<uint8_t> bin_;

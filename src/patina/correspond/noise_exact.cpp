@@ -5,7 +5,8 @@
 // √(A₁ A₂) counted in points.
 //
 // [Hadadan2025, Sec. 4.2] integrates a field of UV texels instead, and loses the correlation where its 4 × 4
-// samples a pixel are fewer than the texels; see docs/decisions/0001-noise-lives-on-the-surface.md for the comparison.
+// samples a pixel are fewer than the texels; see docs/decisions/0001-noise-lives-on-the-surface.md for the
+// comparison.
 #include <algorithm>
 
 #include "patina/base/parallel.h"

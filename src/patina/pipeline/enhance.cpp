@@ -28,7 +28,8 @@ void check_inputs(const Config& config) {
   // A U-Net halves the views three times, and each level's attention needs its own correspondences.
   if (config.detail.bias_weight != 0 && config.cameras.empty() && config.orbit.resolution % 64 != 0)
     throw Error(ErrorCode::kUsage, "--resolution",
-                fmt::format("expected a multiple of 64, or any multiple of 8 with --bias 0, found {}", config.orbit.resolution));
+                fmt::format("expected a multiple of 64, or any multiple of 8 with --bias 0, found {}",
+                            config.orbit.resolution));
   if (config.model.model.empty())
     throw Error(ErrorCode::kUsage, "--model",
                 "give a diffusion model: a folder in the diffusers layout, such as Stable Diffusion 1.5 with "

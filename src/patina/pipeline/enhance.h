@@ -9,8 +9,8 @@ namespace patina::pipeline {
 /// run folder.
 void enhance(const Config& config, RunFolder& run, const Progress& progress);
 
-/// Throws Error for what could only fail at the end, hours later: an output that cannot be written or has no known format, a
-/// model that is missing.
+/// Throws Error for what could only fail at the end, hours later: an output that cannot be written or has no
+/// known format, a model that is missing.
 void check_inputs(const Config& config);
 
 /// Writes the asset with its fitted textures to config.output; nothing if that is empty.

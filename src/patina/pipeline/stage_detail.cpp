@@ -88,7 +88,8 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
                                    .noise = noise.values,
                                    .bias_levels = {}};
     if (config.detail.bias_weight != 0)
-      inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, model.latent_scale());
+      inputs.bias_levels =
+          correspond::bias_levels(*bench.scene, bench.cameras, progress, model.latent_scale());
 
     diffusion::DetailOptions options = config.detail;
     options.seed = config.seed;
