@@ -81,7 +81,7 @@ int main(int argc, char** argv) {
     std::printf("%s%.5f", i ? " " : "loss ", static_cast<double>(r.fit.loss[i]));
   std::printf("\n");
   if (!out.empty()) {
-    write_image(out / "recovery_waterbottle.png", test::view_strip(r, 3, 256));
+    write_image(out / "recovery_views.png", test::view_strip(r, 3, 256));
     write_image(out / "recovery_base_color.png", test::texture_strip(r, 0, 384));
     write_image(out / "recovery_roughness.png", test::texture_strip(r, 1, 384));
     if (options.fit.fit_metallic) write_image(out / "recovery_metallic.png", test::texture_strip(r, 2, 384));
