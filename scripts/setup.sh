@@ -6,7 +6,7 @@
 set -euo pipefail
 
 packages=(
-  g++ cmake ninja-build ccache git ca-certificates
+  g++ cmake ninja-build pkg-config ccache git ca-certificates
   libtorch-dev libopenblas0-pthread   # networks; without OpenBLAS matrix products fall to 5 GFLOP/s
   libembree-dev libtbb-dev            # ray casting, threads
   libopenimageio-dev libwebp-dev zlib1g-dev   # image files, animated turntables, PNG checksums
