@@ -61,7 +61,7 @@ ProcessResult run_ok(const std::vector<std::string>& command) {
 TEST(Enhance, writes_asset_report_and_metrics) {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out.glb", run = folder.path() / "out.patina-run";
-  run_ok(enhance_command(output));
+  run_ok(enhance_command(fs::relative(output)));  // as a user gives it: relative to where they stand
 
   const asset::Asset before = asset::read_asset(kettle()), after = asset::read_asset(output);
   ASSERT_EQ(after.primitives.size(), before.primitives.size());

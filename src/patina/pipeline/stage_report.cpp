@@ -165,7 +165,7 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
   page.warnings = bench.warnings;
   for (const StageRecord& stage : run.stages())
     page.warnings.insert(page.warnings.end(), stage.warnings.begin(), stage.warnings.end());
-  if (config.turntable_frames > 0) page.turntable = run.file("turntable.webp");
+  if (config.turntable_frames > 0) page.turntable = "turntable.webp";
   write_json(run.file("metrics.json"), page.metrics);
   report::write_report(run.file("report.html"), page);
 }
