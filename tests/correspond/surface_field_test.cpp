@@ -47,7 +47,7 @@ TEST(SurfaceField, points_of_a_triangle_lie_inside_and_are_even) {
   for (const size_t triangle : {size_t{0}, size_t{1}, size_t{12345}}) {
     std::array<int, 16> counts{};
     for (int n = 0; n < kCount; ++n) {
-      const vec2 b = SurfaceField::barycentric(triangle, n);
+      const vec2 b = SurfaceField::points_of(triangle).at(n);
       ASSERT_GE(b.x, 0.0f);
       ASSERT_GE(b.y, 0.0f);
       ASSERT_LE(b.x + b.y, 1.0f);

@@ -3,17 +3,18 @@
 #include "patina/correspond/noise.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 #include "patina/base/error.h"
 #include "patina/base/random.h"
-#include "patina/correspond/noise_modes.h"
+#include "patina/correspond/noise_projection.h"
 #include "patina/views/view_set.h"
 
 namespace patina::correspond {
 namespace {
 
-void check_sizes(std::span<const render::Camera> cameras, int latent_scale, const NoiseOptions& options) {
+void check_options(std::span<const render::Camera> cameras, int latent_scale, const NoiseOptions& options) {
   if (latent_scale < 1)
     throw Error(ErrorCode::kUsage, "noise",
                 "image pixels a latent pixel must be at least 1, found " + std::to_string(latent_scale));
@@ -21,6 +22,14 @@ void check_sizes(std::span<const render::Camera> cameras, int latent_scale, cons
     throw Error(
         ErrorCode::kUsage, "noise",
         "the noise field must have at least 1 texel a side, found " + std::to_string(options.field_size));
+  if (options.subpixels < 1 || options.subpixels > 64)
+    throw Error(ErrorCode::kUsage, "noise",
+                "a latent pixel must be split into 1 to 64 subpixels a side, found " +
+                    std::to_string(options.subpixels));
+  if (!(options.points_per_latent > 0.0f) || !std::isfinite(options.points_per_latent))
+    throw Error(ErrorCode::kUsage, "noise",
+                "points a latent pixel must be a positive number, found " +
+                    std::to_string(options.points_per_latent));
   for (const render::Camera& camera : cameras) {
     if (camera.width != cameras[0].width || camera.height != cameras[0].height)
       throw Error(ErrorCode::kUsage, "noise", "all views must have one size");
@@ -33,25 +42,38 @@ void check_sizes(std::span<const render::Camera> cameras, int latent_scale, cons
   }
 }
 
-// Writes view `index` into the grid: √share · surface + √(1 − share) · independent keeps the variance at one.
-void write_view(NoiseField& noise, int grid, size_t index, const std::vector<SurfaceNoise>& surface,
-                uint64_t seed) {
+NoiseProjection project(const render::Scene& scene, const render::Camera& camera, int latent_scale,
+                        const NoiseOptions& options, const Footprints* footprints,
+                        const SurfaceField& field) {
+  switch (options.mode) {
+    case NoiseMode::kIndependent:
+      break;
+    case NoiseMode::kPaper:
+      return project_paper(scene, camera, latent_scale, options.field_size, options.subpixels);
+    case NoiseMode::kExact:
+      return project_exact(scene, camera, *footprints, field);
+  }
+  return {};
+}
+
+// Writes view `view` into the grid: √share · surface + √(1 − share) · independent keeps the variance at one.
+void write_view(NoiseField& noise, int grid, size_t view, const NoiseProjection& projection, uint64_t seed) {
+  const auto surface = draw(projection, seed);
   const int view_width = noise.width / grid, view_height = noise.height / grid;
-  const int x0 = static_cast<int>(index) % grid * view_width,
-            y0 = static_cast<int>(index) / grid * view_height;
+  const int x0 = static_cast<int>(view) % grid * view_width, y0 = static_cast<int>(view) / grid * view_height;
   const size_t plane = static_cast<size_t>(noise.width) * static_cast<size_t>(noise.height);
   for (int y = 0; y < view_height; ++y) {
     for (int x = 0; x < view_width; ++x) {
-      const size_t pixel =
+      const size_t in_grid =
           static_cast<size_t>(y0 + y) * static_cast<size_t>(noise.width) + static_cast<size_t>(x0 + x);
-      const auto white = gaussian4(seed, RandomPurpose::kIndependentNoise, pixel);
-      const SurfaceNoise from_surface =
-          surface.empty()
-              ? SurfaceNoise{}
-              : surface[static_cast<size_t>(y) * static_cast<size_t>(view_width) + static_cast<size_t>(x)];
-      const float a = std::sqrt(from_surface.share), b = std::sqrt(1.0f - from_surface.share);
+      const size_t in_view =
+          static_cast<size_t>(y) * static_cast<size_t>(view_width) + static_cast<size_t>(x);
+      const auto white = gaussian4(seed, RandomPurpose::kIndependentNoise, in_grid);
+      const float share = surface.empty() ? 0.0f : projection.share[in_view];
+      const float a = std::sqrt(share), b = std::sqrt(1.0f - share);
       for (size_t channel = 0; channel < kNoiseChannels; ++channel)
-        noise.values[channel * plane + pixel] = a * from_surface.value[channel] + b * white[channel];
+        noise.values[channel * plane + in_grid] =
+            (share > 0.0f ? a * surface[in_view][channel] : 0.0f) + b * white[channel];
     }
   }
 }
@@ -60,37 +82,37 @@ void write_view(NoiseField& noise, int grid, size_t index, const std::vector<Sur
 
 NoiseField make_noise(const render::Scene& scene, std::span<const render::Camera> cameras, int latent_scale,
                       const NoiseOptions& options, const Progress& progress) {
-  const int grid = views::grid_of(cameras.size());
-  check_sizes(cameras, latent_scale, options);
-  NoiseField noise;
-  noise.width = grid * (cameras[0].width / latent_scale);
-  noise.height = grid * (cameras[0].height / latent_scale);
-  noise.values.assign(kNoiseChannels * static_cast<size_t>(noise.width) * static_cast<size_t>(noise.height),
-                      0.0f);
+  return std::move(make_noises(scene, cameras, latent_scale, options, std::array{options.seed}, progress)[0]);
+}
 
+std::vector<NoiseField> make_noises(const render::Scene& scene, std::span<const render::Camera> cameras,
+                                    int latent_scale, const NoiseOptions& options,
+                                    std::span<const uint64_t> seeds, const Progress& progress) {
+  const int grid = views::grid_of(cameras.size());
+  check_options(cameras, latent_scale, options);
+  std::vector<NoiseField> noises(seeds.size());
+  for (NoiseField& noise : noises) {
+    noise.width = grid * (cameras[0].width / latent_scale);
+    noise.height = grid * (cameras[0].height / latent_scale);
+    noise.values.assign(kNoiseChannels * static_cast<size_t>(noise.width) * static_cast<size_t>(noise.height),
+                        0.0f);
+  }
+
+  const bool exact = options.mode == NoiseMode::kExact;
   std::vector<Footprints> footprints;
-  if (options.mode == NoiseMode::kExact)
+  if (exact)
     for (const render::Camera& camera : cameras)
       footprints.push_back(trace_footprints(scene, camera, latent_scale));
-  const SurfaceField field = make_surface_field(scene, footprints);
+  const SurfaceField field = make_surface_field(scene, footprints, options.points_per_latent);
 
   for (size_t view = 0; view < cameras.size(); ++view) {
     progress.throw_if_stopped();
-    std::vector<SurfaceNoise> surface;
-    switch (options.mode) {
-      case NoiseMode::kIndependent:
-        break;
-      case NoiseMode::kPaper:
-        surface = surface_noise_paper(scene, cameras[view], latent_scale, options.field_size, options.seed);
-        break;
-      case NoiseMode::kExact:
-        surface = surface_noise_exact(scene, cameras[view], footprints[view], field, options.seed);
-        break;
-    }
-    write_view(noise, grid, view, surface, options.seed);
+    const NoiseProjection projection =
+        project(scene, cameras[view], latent_scale, options, exact ? &footprints[view] : nullptr, field);
+    for (size_t i = 0; i < seeds.size(); ++i) write_view(noises[i], grid, view, projection, seeds[i]);
     progress.update("noise", static_cast<double>(view) + 1.0, static_cast<double>(cameras.size()));
   }
-  return noise;
+  return noises;
 }
 
 }  // namespace patina::correspond

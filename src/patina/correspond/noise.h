@@ -28,23 +28,34 @@ struct NoiseField {
 
 struct NoiseOptions {
   NoiseMode mode = NoiseMode::kExact;
-  int field_size =
-      1024;  // M: texels a side of the field, a unit of UV; kPaper only, kExact fits its field to the views
+  int field_size = 1024;  // kPaper: M, texels of the field a side of the unit square of UV
   uint64_t seed = 0;
+  int subpixels = 4;  // kPaper: point samples a side of a latent pixel, 1 to 64
+  float points_per_latent =
+      48.0f;  // kExact: points of the field in a latent pixel of median footprint; docs/noise.md
 };
 
 /// cameras: grid × grid views; latent_scale: image pixels a latent pixel (8 for Stable Diffusion). Each
-/// view's width and height must be divisible by it.
+/// view's width and height must be divisible by it. Throws Error{kUsage} for sizes and options out of range.
 NoiseField make_noise(const render::Scene& scene, std::span<const render::Camera> cameras, int latent_scale,
                       const NoiseOptions& options, const Progress& progress = {});
+
+/// The same for each of `seeds` (options.seed is not read); rays, which do not depend on the seed, are cast
+/// once.
+std::vector<NoiseField> make_noises(const render::Scene& scene, std::span<const render::Camera> cameras,
+                                    int latent_scale, const NoiseOptions& options,
+                                    std::span<const uint64_t> seeds, const Progress& progress = {});
 
 /// Whiteness of one view's noise [4,h,w]: what DESIGN demands of it.
 struct NoiseStatistics {
   float mean = 0, variance = 0;
   float autocorrelation_x = 0, autocorrelation_y = 0;  // lag 1
   float kolmogorov_smirnov_p = 0;                      // p-value against N(0,1)
+  int64_t num_values = 0;
 };
-/// One entry a view of the grid.
-std::vector<NoiseStatistics> noise_statistics(const NoiseField& noise, int grid);
+/// One entry a view of the grid. With a mask [height · width] over the whole grid only its nonzero latent
+/// pixels count, and only neighbours that both do; a view of none has num_values = 0 and the rest zero.
+std::vector<NoiseStatistics> noise_statistics(const NoiseField& noise, int grid,
+                                              std::span<const uint8_t> mask = {});
 
 }  // namespace patina::correspond

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "patina/correspond/noise.h"
+#include "patina/correspond/shared_patches.h"
 
 namespace patina::correspond {
 
@@ -15,10 +16,12 @@ struct NoiseAgreement {
   double of_bound() const { return bound > 0 ? correlation / bound : 0; }
 };
 
-/// Compares view `from` with view `to`: each latent pixel of `from` with the one of `to` that shares most of
-/// its surface. Areas are measured by samples_per_side² rays a latent pixel, independent of how the noise was
-/// made. Several `noises` of one kind and different seeds make the estimate sharper: its deviation is about
-/// 1/√(4 · pairs · noises).
+/// Over `patches` of views `from` and `to` of the grid. Several `noises` of one kind and different seeds make
+/// the estimate sharper: the correlation's deviation is about 1/√(4 · pairs · noises).
+NoiseAgreement noise_agreement(std::span<const SharedPatch> patches, std::span<const NoiseField> noises,
+                               int grid, int from, int to);
+
+/// The same, with the patches found by samples_per_side² rays a latent pixel.
 NoiseAgreement noise_agreement(const render::Scene& scene, std::span<const render::Camera> cameras,
                                int latent_scale, std::span<const NoiseField> noises, int from, int to,
                                int samples_per_side = 8);

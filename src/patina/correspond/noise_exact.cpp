@@ -6,19 +6,15 @@
 //
 // [Hadadan2025, Sec. 4.2] integrates a field of UV texels instead, and loses the correlation where its 4 × 4
 // samples a pixel are fewer than the texels; see docs/decisions/0001-noise-lives-on-the-surface.md for the
-// comparison.
+// comparison and docs/noise.md for how many points it takes.
 #include <algorithm>
 
 #include "patina/base/parallel.h"
-#include "patina/base/random.h"
-#include "patina/correspond/noise_modes.h"
+#include "patina/correspond/noise_projection.h"
 
 namespace patina::correspond {
 namespace {
 
-// Points a latent pixel of median size gets. Whiteness does not depend on it; the correlation of two views
-// reaches its bound as soon as nearly no pixel is left with a handful.
-constexpr double kPointsPerLatent = 48.0;
 // A field for a close-up of a large asset would be mostly out of sight; past this it gets coarser.
 constexpr int64_t kMaxPoints = int64_t{1} << 23;
 
@@ -46,8 +42,9 @@ std::vector<int32_t> landing_cells(const render::Scene& scene, const render::Cam
         }
         normal = -normal;
       }
+      const SurfaceField::Points points = SurfaceField::points_of(index);
       for (; point < stop; ++point) {
-        const vec3 p_world = triangle.at(SurfaceField::barycentric(index, point - field.first_point(index)));
+        const vec3 p_world = triangle.at(points.at(point - field.first_point(index)));
         const auto pixel = views::seen_at(scene, camera, p_world, normal);
         if (!pixel || (see_through && !views::opaque_at(scene, eye, p_world))) continue;
         const int x = std::min(static_cast<int>(pixel->x / latent_scale), footprints.width - 1);
@@ -61,7 +58,8 @@ std::vector<int32_t> landing_cells(const render::Scene& scene, const render::Cam
 
 }  // namespace
 
-SurfaceField make_surface_field(const render::Scene& scene, std::span<const Footprints> footprints) {
+SurfaceField make_surface_field(const render::Scene& scene, std::span<const Footprints> footprints,
+                                double points_per_latent) {
   std::vector<float> areas;
   for (const Footprints& view : footprints)
     for (size_t i = 0; i < view.area.size(); ++i)
@@ -74,29 +72,33 @@ SurfaceField make_surface_field(const render::Scene& scene, std::span<const Foot
   if (areas.empty()) return SurfaceField(scene, 0.0, 0);
   const auto middle = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
   std::nth_element(areas.begin(), middle, areas.end());
-  return SurfaceField(scene, *middle > 0.0f ? kPointsPerLatent / static_cast<double>(*middle) : 0.0,
+  return SurfaceField(scene, *middle > 0.0f ? points_per_latent / static_cast<double>(*middle) : 0.0,
                       kMaxPoints);
 }
 
-std::vector<SurfaceNoise> surface_noise_exact(const render::Scene& scene, const render::Camera& camera,
-                                              const Footprints& footprints, const SurfaceField& field,
-                                              uint64_t seed) {
+NoiseProjection project_exact(const render::Scene& scene, const render::Camera& camera,
+                              const Footprints& footprints, const SurfaceField& field) {
   const std::vector<int32_t> cells = landing_cells(scene, camera, footprints, field);
-  // Sums run in the order of the points, in one thread: the same bits however many threads found the cells.
-  std::vector<SurfaceNoise> out(footprints.coverage.size());
-  std::vector<int32_t> count(out.size(), 0);
-  for (size_t point = 0; point < cells.size(); ++point) {
-    if (cells[point] < 0) continue;
-    const auto cell = static_cast<size_t>(cells[point]);
-    const auto value = gaussian4(seed, RandomPurpose::kNoiseField, point);
-    for (size_t channel = 0; channel < kNoiseChannels; ++channel) out[cell].value[channel] += value[channel];
-    ++count[cell];
-  }
-  for (size_t cell = 0; cell < out.size(); ++cell) {
-    if (count[cell] == 0) continue;
-    const float scale = 1.0f / std::sqrt(static_cast<float>(count[cell]));
-    for (float& value : out[cell].value) value *= scale;
-    out[cell].share = std::min(footprints.coverage[cell], 1.0f);
+  const size_t num_pixels = footprints.coverage.size();
+  NoiseProjection out{.width = footprints.width, .height = footprints.height, .field = kSurfaceFieldId};
+
+  // A counting sort by pixel, which keeps each pixel's points ascending.
+  out.first.assign(num_pixels + 1, 0);
+  for (const int32_t cell : cells)
+    if (cell >= 0) ++out.first[static_cast<size_t>(cell) + 1];
+  for (size_t pixel = 0; pixel < num_pixels; ++pixel) out.first[pixel + 1] += out.first[pixel];
+  out.index.resize(static_cast<size_t>(out.first.back()));
+  std::vector<int64_t> next(out.first.begin(), out.first.end() - 1);
+  for (size_t point = 0; point < cells.size(); ++point)
+    if (cells[point] >= 0) out.index[static_cast<size_t>(next[static_cast<size_t>(cells[point])]++)] = point;
+
+  out.scale.assign(num_pixels, 0.0f);
+  out.share.assign(num_pixels, 0.0f);
+  for (size_t pixel = 0; pixel < num_pixels; ++pixel) {
+    const int64_t count = out.first[pixel + 1] - out.first[pixel];
+    if (count == 0) continue;
+    out.scale[pixel] = 1.0f / std::sqrt(static_cast<float>(count));
+    out.share[pixel] = std::min(footprints.coverage[pixel], 1.0f);
   }
   return out;
 }

@@ -1,17 +1,14 @@
 // View-correlated noise as published [Hadadan2025, Sec. 4.2]: each latent pixel is split into 4 × 4 subpixels
 // whose corners are cast to UV, and the value is the area-weighted mean of the field at their centres,
-// divided by the estimated deviation.
+// divided by the estimated deviation. docs/noise.md goes through it sentence by sentence.
 #include <algorithm>
 #include <optional>
 
 #include "patina/base/parallel.h"
-#include "patina/base/random.h"
-#include "patina/correspond/noise_modes.h"
+#include "patina/correspond/noise_projection.h"
 
 namespace patina::correspond {
 namespace {
-
-constexpr int kSide = 4;
 
 // UV of what a ray through a subpixel corner meets. A quad is used only if all its corners lie on one
 // primitive.
@@ -56,55 +53,53 @@ float field_share(float texels) {
 
 }  // namespace
 
-std::vector<SurfaceNoise> surface_noise_paper(const render::Scene& scene, const render::Camera& camera,
-                                              int latent_scale, int field_size, uint64_t seed) {
+NoiseProjection project_paper(const render::Scene& scene, const render::Camera& camera, int latent_scale,
+                              int field_size, int subpixels) {
   const int width = camera.width / latent_scale, height = camera.height / latent_scale;
-  const int stride = kSide * width + 1;
-  const auto step = static_cast<float>(latent_scale) / static_cast<float>(kSide);
-  std::vector<Corner> corners(static_cast<size_t>(stride) * static_cast<size_t>(kSide * height + 1));
-  parallel_for(0, kSide * height + 1, 4, [&](int64_t begin, int64_t end) {
+  const int stride = subpixels * width + 1;
+  const auto step = static_cast<float>(latent_scale) / static_cast<float>(subpixels);
+  std::vector<Corner> corners(static_cast<size_t>(stride) * static_cast<size_t>(subpixels * height + 1));
+  parallel_for(0, subpixels * height + 1, 4, [&](int64_t begin, int64_t end) {
     for (int64_t y = begin; y < end; ++y)
       for (int x = 0; x < stride; ++x)
         corners[static_cast<size_t>(y) * static_cast<size_t>(stride) + static_cast<size_t>(x)] =
             cast_corner(scene, camera.ray(step * vec2(static_cast<float>(x), static_cast<float>(y))));
   });
 
+  NoiseProjection out{.width = width, .height = height, .field = kUvFieldId};
+  const auto num_pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+  out.first.assign(1, 0);
+  out.scale.assign(num_pixels, 0.0f);
+  out.share.assign(num_pixels, 0.0f);
   const float texel_area = 1.0f / square(static_cast<float>(field_size));
-  std::vector<SurfaceNoise> out(static_cast<size_t>(width) * static_cast<size_t>(height));
-  parallel_for(0, height, 1, [&](int64_t begin, int64_t end) {
-    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
-      for (int x = 0; x < width; ++x) {
-        SurfaceNoise& pixel =
-            out[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
-        float sum_area = 0, sum_variance = 0;
-        for (int sub = 0; sub < kSide * kSide; ++sub) {
-          const int u = kSide * x + sub % kSide, v = kSide * y + sub / kSide;
-          const Corner* row =
-              &corners[static_cast<size_t>(v) * static_cast<size_t>(stride) + static_cast<size_t>(u)];
-          const Corner &c00 = row[0], &c10 = row[1], &c01 = row[stride], &c11 = row[stride + 1];
-          if (c00.primitive < 0 || c10.primitive != c00.primitive || c01.primitive != c00.primitive ||
-              c11.primitive != c00.primitive)
-            continue;
-          const float sub_area = area(c00.uv, c10.uv, c11.uv) + area(c00.uv, c11.uv, c01.uv);
-          if (!(sub_area > 0.0f)) continue;
-          const vec2 center = 0.25f * (c00.uv + c10.uv + c01.uv + c11.uv);
-          const int material = scene.primitives()[static_cast<size_t>(c00.primitive)]->material;
-          // The upper half of the sub-index keeps this field apart from the surface field of the same seed.
-          const auto f = gaussian4(seed, RandomPurpose::kNoiseField, texel_at(center, field_size, material),
-                                   0x80000000u);
-          for (size_t channel = 0; channel < kNoiseChannels; ++channel)
-            pixel.value[channel] += sub_area * f[channel];
-          const float covariance = std::max(texel_area / sub_area - 1.0f, 0.0f);
-          sum_area += sub_area;
-          sum_variance += square(sub_area) * (1.0f + covariance);
-        }
-        if (!(sum_variance > 0.0f)) continue;
-        const float scale = 1.0f / std::sqrt(sum_variance);
-        for (float& value : pixel.value) value *= scale;
-        pixel.share = field_share(sum_area / texel_area);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      float sum_area = 0, sum_variance = 0;
+      for (int sub = 0; sub < subpixels * subpixels; ++sub) {
+        const int u = subpixels * x + sub % subpixels, v = subpixels * y + sub / subpixels;
+        const Corner* row =
+            &corners[static_cast<size_t>(v) * static_cast<size_t>(stride) + static_cast<size_t>(u)];
+        const Corner &c00 = row[0], &c10 = row[1], &c01 = row[stride], &c11 = row[stride + 1];
+        if (c00.primitive < 0 || c10.primitive != c00.primitive || c01.primitive != c00.primitive ||
+            c11.primitive != c00.primitive)
+          continue;
+        const float sub_area = area(c00.uv, c10.uv, c11.uv) + area(c00.uv, c11.uv, c01.uv);
+        if (!(sub_area > 0.0f)) continue;
+        const vec2 center = 0.25f * (c00.uv + c10.uv + c01.uv + c11.uv);
+        const int material = scene.primitives()[static_cast<size_t>(c00.primitive)]->material;
+        out.index.push_back(texel_at(center, field_size, material));
+        out.weight.push_back(sub_area);
+        const float covariance = std::max(texel_area / sub_area - 1.0f, 0.0f);
+        sum_area += sub_area;
+        sum_variance += square(sub_area) * (1.0f + covariance);
       }
+      const size_t pixel = out.first.size() - 1;
+      out.first.push_back(static_cast<int64_t>(out.index.size()));
+      if (!(sum_variance > 0.0f)) continue;
+      out.scale[pixel] = 1.0f / std::sqrt(sum_variance);
+      out.share[pixel] = field_share(sum_area / texel_area);
     }
-  });
+  }
   return out;
 }
 

@@ -36,9 +36,11 @@ size_t SurfaceField::triangle_of_point(int64_t point) const {
 // The additive recurrence with the inverse powers of the plastic number covers the unit square more evenly
 // than random points [Roberts2018]; folding its upper half over makes it a triangle. Each triangle starts at
 // its own random place.
-vec2 SurfaceField::barycentric(size_t index, int64_t n) {
-  RandomStream random(0, RandomPurpose::kNoiseField, index, 1);
-  const vec2 start = random.uniform2();
+SurfaceField::Points SurfaceField::points_of(size_t index) {
+  return {RandomStream(0, RandomPurpose::kNoiseField, index, 1).uniform2()};
+}
+
+vec2 SurfaceField::Points::at(int64_t n) const {
   constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
   const double x = static_cast<double>(start.x) + kStepX * static_cast<double>(n);
   const double y = static_cast<double>(start.y) + kStepY * static_cast<double>(n);

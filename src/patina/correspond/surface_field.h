@@ -28,8 +28,13 @@ class SurfaceField {
   int64_t first_point(size_t index) const { return first_point_[index]; }
   /// The triangle that owns a point.
   size_t triangle_of_point(int64_t point) const;
-  /// Where the n-th point of triangle `index` lies: weights of its second and third vertex.
-  static vec2 barycentric(size_t index, int64_t n);
+  /// Where the points of a triangle lie.
+  struct Points {
+    vec2 start;  // in the unit square
+    /// Weights of the triangle's second and third vertex for its n-th point.
+    vec2 at(int64_t n) const;
+  };
+  static Points points_of(size_t index);
 
  private:
   std::vector<TriangleRef> triangles_;
