@@ -15,6 +15,11 @@ if(PATINA_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER "${PATINA_CCACHE}")
 endif()
 
+option(PATINA_CUDA "Build the CUDA parts, against a LibTorch 2.x with CUDA" OFF)
+if(PATINA_CUDA)
+  include(patina_cuda)
+endif()
+
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(nlohmann_json REQUIRED)
@@ -34,10 +39,11 @@ endif()
 
 add_library(patina_options INTERFACE)
 target_include_directories(patina_options INTERFACE "${CMAKE_SOURCE_DIR}/src")
-target_compile_options(patina_options INTERFACE
-  # GCC 12 sees overflows and overlaps in std::vector and std::string that are not there (its bugs 105329, 105651).
-  -Wno-stringop-overflow -Wno-restrict
+# GCC 12 sees overflows and overlaps in std::vector and std::string that are not there (its bugs 105329, 105651).
+set(options -Wno-stringop-overflow -Wno-restrict
   -march=${PATINA_ARCH} -Wall -Wextra -Wpedantic -Wshadow $<$<BOOL:${PATINA_WERROR}>:-Werror>)
+target_compile_options(patina_options INTERFACE "$<$<COMPILE_LANGUAGE:CXX>:${options}>"
+  "$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra;$<$<BOOL:${PATINA_WERROR}>:-Werror=all-warnings>>")
 target_compile_definitions(patina_options INTERFACE GLM_FORCE_SILENT_WARNINGS GLM_ENABLE_EXPERIMENTAL
   PATINA_VERSION="${PROJECT_VERSION}")
 

@@ -9,17 +9,11 @@
 #include <cstdint>
 
 #include "patina/attention/attention.h"
+#include "patina/attention/query_blocks.h"
 
 namespace patina::attention {
 
-inline constexpr int kBlockQueries = 64;  // lanes of a block: 8 × 8 latent pixels where a bias is given
 inline constexpr int kTileKeysMax = 128;  // bound of the kernels' tile lengths
-
-/// A key and the lanes of the block for which it is biased.
-struct BiasedKey {
-  int32_t key;
-  uint64_t lanes;
-};
 
 /// How packed keys and values lie in memory; queries follow the keys' element.
 enum class Packing {

@@ -1,4 +1,4 @@
-#include "patina/attention/cpu/query_blocks.h"
+#include "patina/attention/query_blocks.h"
 
 #include <algorithm>
 #include <limits>

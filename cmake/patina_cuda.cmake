@@ -1,0 +1,25 @@
+# The cuda preset: patina against a LibTorch 2.x with CUDA (pip's torch package, or pytorch.org's archive).
+# Included before find_package(Torch), which then enables the CUDA language and turns TORCH_CUDA_ARCH_LIST into
+# nvcc's -gencode flags.
+
+find_path(PATINA_TORCH_PREFIX share/cmake/Torch/TorchConfig.cmake
+  PATHS ${CMAKE_PREFIX_PATH} PATH_SUFFIXES ../.. NO_DEFAULT_PATH
+  DOC "Folder of LibTorch 2.x that holds include, lib and share")
+if(NOT PATINA_TORCH_PREFIX)
+  message(FATAL_ERROR "PATINA_CUDA needs a LibTorch 2.x with CUDA: give -DCMAKE_PREFIX_PATH=<torch>/share/cmake, "
+    "where <torch> is what `python3 -c 'import torch; print(torch.__path__[0])'` prints.")
+endif()
+
+# TorchConfig.cmake looks for these by name, in the system's folders first: a LibTorch of another version installed there
+# would be linked beside the one that was asked for.
+foreach(name torch c10 c10_cuda)
+  string(TOUPPER ${name} upper)
+  foreach(variable ${name}_LIBRARY ${upper}_LIBRARY)
+    find_library(${variable} ${name} PATHS "${PATINA_TORCH_PREFIX}/lib" NO_DEFAULT_PATH NO_CACHE)
+    set(${variable} "${${variable}}" CACHE FILEPATH "Of the LibTorch in PATINA_TORCH_PREFIX" FORCE)
+  endforeach()
+endforeach()
+
+if(PATINA_CCACHE)
+  set(CMAKE_CUDA_COMPILER_LAUNCHER "${PATINA_CCACHE}")
+endif()
