@@ -8,18 +8,13 @@
 
 #include "../support.h"
 #include "patina/base/error.h"
-#include "patina/base/random.h"
 #include "patina/nn/safetensors.h"
+#include "small_runs.h"
 
 namespace patina::diffusion {
 namespace {
 
 namespace fs = std::filesystem;
-
-const Model& tiny_model() {
-  static const Model model({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, 0});
-  return model;
-}
 
 std::vector<float> floats(const nn::SafeTensors& file, const std::string& name) {
   const nn::TensorEntry* entry = file.find(name);
@@ -41,79 +36,11 @@ Image image_of(const nn::SafeTensors& file, const std::string& name) {
   return image;
 }
 
-double max_difference(const Image& a, const Image& b) {
-  EXPECT_EQ(a.pixels.size(), b.pixels.size());
-  double difference = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i) {
-    difference =
-        std::max(difference, std::abs(static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i])));
-  }
-  return difference;
-}
-
-/// Smooth views of `size`² pixels that differ from one another, and noise for them.
-DetailInputs made_inputs(int grid, int size) {
-  DetailInputs inputs;
-  inputs.grid = grid;
-  for (int v = 0; v < grid * grid; ++v) {
-    Image tile(size, size, 3), normal(size, size, 3);
-    for (int y = 0; y < size; ++y) {
-      for (int x = 0; x < size; ++x) {
-        const auto u = static_cast<float>(x) / static_cast<float>(size),
-                   w = static_cast<float>(y) / static_cast<float>(size);
-        tile.set_rgb(x, y, vec3(0.5f + 0.4f * std::sin(9 * u + static_cast<float>(v)), w, 0.3f));
-        normal.set_rgb(x, y, vec3(u, w, 0.9f));
-      }
-    }
-    inputs.tile_views.push_back(tile);
-    inputs.normal_views.push_back(normal);
-  }
-  const size_t side = static_cast<size_t>(grid) * static_cast<size_t>(size) / 8;
-  inputs.noise.resize(4 * side * side);
-  for (size_t i = 0; i < inputs.noise.size(); i += 4) {
-    const auto four = gaussian4(3, RandomPurpose::kTest, i);
-    std::copy(four.begin(), four.end(), inputs.noise.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  return inputs;
-}
-
-/// Every pixel favours the pixels at its own place in the other views, at each resolution of the tiny model
-/// that has attention.
-std::vector<attention::KeyBuckets> same_place_bias(int grid, int view) {
-  std::vector<attention::KeyBuckets> levels;
-  for (const int radius : {1, 0}) {
-    attention::KeyBuckets buckets;
-    buckets.grid = grid, buckets.view_width = buckets.view_height = view, buckets.window_radius = radius;
-    buckets.offsets.push_back(0);
-    for (int y = 0; y < buckets.height(); ++y) {
-      for (int x = 0; x < buckets.width(); ++x) {
-        for (int vy = 0; vy < grid; ++vy) {
-          for (int vx = 0; vx < grid; ++vx) {
-            if (vx == x / view && vy == y / view) continue;
-            buckets.keys.push_back((vy * view + y % view) * buckets.width() + vx * view + x % view);
-          }
-        }
-        buckets.offsets.push_back(static_cast<int32_t>(buckets.keys.size()));
-      }
-    }
-    levels.push_back(buckets);
-    view /= 2;
-  }
-  return levels;
-}
+using test::made_inputs, test::max_difference, test::same_place_bias, test::short_options, test::tiny_model;
 
 std::vector<Image> run(const DetailInputs& inputs, const DetailOptions& options,
                        const DetailHooks& hooks = {}, const Progress& progress = {}) {
   return generate_detail(tiny_model(), inputs, options, hooks, progress);
-}
-
-DetailOptions short_options(Scheduler scheduler = Scheduler::kUniPc) {
-  DetailOptions options;
-  options.prompt = "a rusty old kettle";
-  options.num_steps = 5;
-  options.strength = 0.8f;
-  options.scheduler = scheduler;
-  return options;
 }
 
 TEST(Detail, without_bias_it_is_the_reference_controlnet_image_to_image) {
@@ -187,7 +114,7 @@ TEST(Detail, stops_between_steps_when_asked_and_reports_every_step) {
 TEST(Detail, a_bias_of_zero_is_none_and_another_is_felt) {
   DetailInputs inputs = made_inputs(2, 128);
   const std::vector<Image> plain = run(inputs, short_options());
-  inputs.bias_levels = same_place_bias(2, 16);
+  inputs.bias_levels = same_place_bias(2, 16, 2);
   DetailOptions options = short_options();
   EXPECT_EQ(run(inputs, options)[0].pixels, plain[0].pixels);
   options.bias_weight = 4;
@@ -195,6 +122,20 @@ TEST(Detail, a_bias_of_zero_is_none_and_another_is_felt) {
   EXPECT_GT(max_difference(paper[0], plain[0]), 1e-3);
   options.bias_scaling = BiasScaling::kAdditive;
   EXPECT_GT(max_difference(run(inputs, options)[0], paper[0]), 1e-3);
+}
+
+TEST(Detail, the_bias_of_controlnets_is_felt_only_where_it_is_asked_for) {
+  DetailInputs inputs = made_inputs(2, 128);
+  inputs.bias_levels = same_place_bias(2, 16, 2);
+  DetailOptions options = short_options();
+  options.num_steps = 2, options.strength = 1;
+  const std::vector<Image> plain = run(inputs, options);
+  options.bias_controlnet = true;
+  EXPECT_EQ(run(inputs, options)[0].pixels, plain[0].pixels) << "with a weight of 0";
+  options.bias_weight = 4;
+  const std::vector<Image> both = run(inputs, options);
+  options.bias_controlnet = false;
+  EXPECT_GT(max_difference(run(inputs, options)[0], both[0]), 1e-4);
 }
 
 TEST(Detail, options_are_felt) {
@@ -246,7 +187,7 @@ TEST(Detail, refuses_inputs_that_do_not_fit_and_says_what_would) {
   inputs.noise.pop_back();
   EXPECT_NE(message(inputs, short_options()).find("expected 1024"), std::string::npos);
   inputs = good;
-  inputs.bias_levels = same_place_bias(2, 16);
+  inputs.bias_levels = same_place_bias(2, 16, 2);
   EXPECT_NE(message(inputs, short_options()).find("no resolution of the U-Net"), std::string::npos);
   inputs = good;
   for (Image& view : inputs.tile_views) view = Image(60, 60, 3);

@@ -60,11 +60,11 @@ at::Tensor ControlNet::hint(const at::Tensor& condition, const nn::Recorder& rec
 
 ControlResiduals ControlNet::operator()(const at::Tensor& sample, const at::Tensor& timesteps,
                                         const at::Tensor& text, const at::Tensor& hint, float scale,
-                                        const nn::Recorder& record) const {
+                                        const nn::Recorder& record, const nn::SelfAttentionBias* bias) const {
   PATINA_CHECK_EQ(sample.dim(), 4);
   PATINA_CHECK_EQ(sample.size(1), config_.unet.in_channels);
   const at::Tensor x = sample.to(type_).contiguous(at::MemoryFormat::ChannelsLast);
-  const Conditions conditions{encoder_.time(timesteps, record), text.to(type_), nullptr, record};
+  const Conditions conditions{encoder_.time(timesteps, record), text.to(type_), bias, record};
   const auto [skips, mid] = encoder_(encoder_.conv_in(x, record) + hint, conditions);
 
   ControlResiduals residuals;

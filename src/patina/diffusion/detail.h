@@ -66,9 +66,10 @@ struct DetailInputs {
   std::vector<Image> tile_views;    // grid² × [H,W,3] sRGB [0,1]: tile condition and start image
   std::vector<Image> normal_views;  // grid² × [H,W,3] [0,1]
   std::vector<float> noise;         // [C, grid·H/scale, grid·W/scale] f32, unit variance
-  std::vector<attention::KeyBuckets> bias_levels;  // finest first; empty: no bias
+  std::vector<attention::KeyBuckets>
+      bias_levels;  // finest first; empty: no bias; levels coarser than the U-Net's coarsest are not used
   std::vector<Image> start_views = {};  // grid² × [H,W,3] sRGB [0,1]: start image where it is not the tile
-                                   // condition; empty: tile_views
+                                        // condition; empty: tile_views
 };
 
 struct DetailOptions {
@@ -80,7 +81,8 @@ struct DetailOptions {
   Scheduler scheduler = Scheduler::kUniPc;
   float bias_weight = 0;  // w; 0: no bias
   BiasScaling bias_scaling = BiasScaling::kPaper;
-  uint64_t seed = 0;  // of the noise that ancestral schedulers draw
+  bool bias_controlnet = false;  // the ControlNets' self-attention too
+  uint64_t seed = 0;             // of the noise that ancestral schedulers draw
 };
 
 /// Where a run stands between two steps, as bytes that restore it exactly; for resuming a killed run.

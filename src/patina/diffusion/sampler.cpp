@@ -1,5 +1,6 @@
 #include "patina/diffusion/sampler.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include <ATen/ATen.h>
@@ -28,10 +29,11 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
   for (const Control& control : controls) {
     if (control.scale == 0) continue;
     residuals =
-        sum(std::move(residuals), (*control.network)(sample, timesteps, text, control.hint, control.scale));
+        sum(std::move(residuals), (*control.network)(sample, timesteps, text, control.hint, control.scale, {},
+                                                     bias_controls ? bias : nullptr));
   }
   const at::Tensor out =
-      (*unet)({sample, timesteps, text, residuals.mid.defined() ? &residuals : nullptr, bias})
+      (*unet)({sample, timesteps, text, residuals.mid.defined() ? &residuals : nullptr, bias}, record)
           .to(at::kFloat)
           .contiguous();
   if (batch == 1) return {out, out, out};
@@ -42,7 +44,8 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
 std::vector<float> sample(const Denoiser& denoiser, const SchedulePlan& plan, SamplerState state,
                           at::IntArrayRef shape, const SamplerCallbacks& callbacks) {
   PATINA_CHECK_EQ(static_cast<int64_t>(state.latents.size()), c10::multiply_integers(shape));
-  while (state.next_call < plan.num_calls()) {
+  const int end = std::min(callbacks.end.value_or(plan.num_calls()), plan.num_calls());
+  while (state.next_call < end) {
     const int index = state.next_call;
     std::vector<float> input = scale_model_input(plan, index, state.latents);
     const Guided prediction =

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,8 @@ struct Denoiser {
   at::Tensor text;  // [2,T,D], negative prompt first; [1,T,D] without guidance
   float guidance_scale = 1;
   const nn::SelfAttentionBias* bias = nullptr;  // null: none
+  bool bias_controls = false;                   // whether it acts on the ControlNets too
+  nn::Recorder record = {};                     // listens to the U-Net
 
   /// latents [1,C,H,W] f32, scaled as the scheduler asks.
   Guided operator()(const at::Tensor& latents, double timestep) const;
@@ -55,6 +58,8 @@ struct SamplerCallbacks {
   std::function<std::vector<float>(int index, size_t size)> noise;
   /// After every call; may be empty.
   std::function<void(const SamplerState& state, const Guided& prediction)> on_step;
+  /// Only calls before this index are run; nullopt: all.
+  std::optional<int> end = std::nullopt;
 };
 
 /// Runs the plan's calls from `state` on and returns the last latents [C,H,W]. `shape` is [1,C,H,W].

@@ -1,0 +1,46 @@
+// A run of image-to-image over a view grid, ready for its first step: what making detail and looking at its
+// attention share. Seen only by the sources that see Torch.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "patina/diffusion/model.h"
+#include "patina/diffusion/sampler.h"
+
+namespace patina::diffusion {
+
+/// Sizes of a run, in pixels and latent pixels.
+struct GridSizes {
+  int64_t grid = 1;                             // views a side
+  int64_t view_height = 0, view_width = 0;      // pixels of one view
+  int64_t latent_height = 0, latent_width = 0;  // latent pixels of one view
+};
+
+/// `denoiser` refers to `bias`, which refers to the inputs' levels: a run stays where it was made, and the
+/// model and inputs outlive it.
+struct DetailRun {
+  GridSizes sizes;
+  SchedulePlan plan;
+  int start = 0;  // first call of the plan that is run
+  nn::SelfAttentionBias bias;
+  Denoiser denoiser;
+  SamplerState state;
+  std::array<int64_t, 4> shape{};  // of the grid's latents: [1,C,H,W]
+
+  DetailRun() = default;
+  DetailRun(const DetailRun&) = delete;
+  DetailRun& operator=(const DetailRun&) = delete;
+};
+
+/// Checks inputs and options, encodes text, conditions and start images, and adds the noise of the first
+/// step, or takes the state of `resume`. Throws Error{kUsage} if sizes do not fit.
+std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& inputs,
+                                        const DetailOptions& options, const std::optional<Checkpoint>& resume,
+                                        const Progress& progress);
+
+/// Noise of ancestral schedulers: a value depends on (seed, call, place) alone, so that a resumed run draws
+/// the same.
+std::vector<float> scheduler_noise(uint64_t seed, int call, size_t size);
+
+}  // namespace patina::diffusion
