@@ -1,5 +1,10 @@
 #include "worlds.h"
 
+#include <cmath>
+#include <limits>
+
+#include "patina/base/random.h"
+
 namespace patina::correspond::test {
 
 World make_world(const std::vector<scenes::Part>& parts, const std::vector<scenes::Part>& context,
@@ -16,26 +21,104 @@ World make_world(const std::vector<scenes::Part>& parts, const std::vector<scene
   return world;
 }
 
+namespace {
+
+// The same triangles with corners of their own.
+asset::Primitive unindexed(const asset::Primitive& mesh) {
+  asset::Primitive out;
+  out.name = mesh.name;
+  out.uv.resize(1);
+  for (const uvec3& triangle : mesh.triangles) {
+    const auto first = static_cast<uint32_t>(out.p_world.size());
+    for (const uint32_t corner : {triangle.x, triangle.y, triangle.z}) {
+      out.p_world.push_back(mesh.p_world[corner]);
+      out.n_world.push_back(mesh.n_world[corner]);
+      out.uv[0].push_back(mesh.uv[0][corner]);
+    }
+    out.triangles.push_back({first, first + 1, first + 2});
+  }
+  return out;
+}
+
+}  // namespace
+
 World sphere_world(UvState state, int rings) {
   asset::Primitive sphere = scenes::sphere(vec3(0.0f), 1.0f, rings);
+  const auto change_uvs = [&](const auto& change) {
+    for (vec2& uv : sphere.uv[0]) uv = change(uv);
+  };
   switch (state) {
     case UvState::kClean:
       break;
-    case UvState::kMirrored:  // left and right share texels
-      for (vec2& uv : sphere.uv[0]) uv.x = std::abs(2.0f * uv.x - 1.0f);
+    case UvState::kSeams:
+      sphere = unindexed(sphere);
+      for (size_t corner = 0; corner < sphere.uv[0].size(); ++corner)
+        sphere.uv[0][corner] += RandomStream(1, RandomPurpose::kTest, corner / 3).uniform2();
       break;
-    case UvState::kOverlapping:  // every ring of faces is the same strip
-      for (vec2& uv : sphere.uv[0]) uv.y *= static_cast<float>(rings);
+    case UvState::kMirrored:
+      change_uvs([](const vec2& uv) { return vec2(std::abs(2.0f * uv.x - 1.0f), uv.y); });
+      break;
+    case UvState::kOverlapping:
+      change_uvs([&](const vec2& uv) { return vec2(uv.x, uv.y * static_cast<float>(rings)); });
       break;
     case UvState::kTiled:
-      for (vec2& uv : sphere.uv[0]) uv *= 7.0f;
+      change_uvs([](const vec2& uv) { return 7.0f * uv; });
+      break;
+    case UvState::kTiny:
+      change_uvs([](const vec2& uv) { return 1e-4f * uv; });
+      break;
+    case UvState::kHuge:
+      change_uvs([](const vec2& uv) { return 1e4f * uv; });
       break;
     case UvState::kPoint:
-      for (vec2& uv : sphere.uv[0]) uv = vec2(0.3f);
+      change_uvs([](const vec2&) { return vec2(0.3f); });
+      break;
+    case UvState::kNotFinite:
+      for (size_t i = 0; i < sphere.uv[0].size(); i += 9)
+        sphere.uv[0][i] = vec2(std::numeric_limits<float>::quiet_NaN());
       break;
     case UvState::kMissing:
       sphere.uv.clear();
       break;
+  }
+  return make_world({{sphere, {}}});
+}
+
+World transformed_sphere_world(int rings) {
+  World world = sphere_world(UvState::kClean, rings);
+  asset::TextureRef& texture = world.asset->materials[0].base_color;
+  texture.image = 0;
+  texture.uv_transform =
+      mat3(0, -30, 0, 30, 0, 0, 0.25f, 0.5f, 1);  // turned by a quarter, tiled by 30, moved
+  world.asset->images.emplace_back(4, 4, 3);
+  world.asset->image_names.emplace_back("checker");
+  world.scene = std::make_unique<render::Scene>(*world.asset, asset::resolve_materials(*world.asset),
+                                                render::constant_environment(vec3(1.0f)));
+  return world;
+}
+
+World banded_sphere_world(int rings) {
+  constexpr size_t kBands = 5;
+  const asset::Primitive sphere = scenes::sphere(vec3(0.0f), 1.0f, rings);
+  std::vector<scenes::Part> parts(kBands, {sphere, {}});
+  for (scenes::Part& part : parts) part.primitive.triangles.clear();
+  for (size_t i = 0; i < sphere.triangles.size(); ++i)
+    parts[i * kBands / sphere.triangles.size()].primitive.triangles.push_back(sphere.triangles[i]);
+  return make_world(parts);
+}
+
+World degenerate_sphere_world(int rings) {
+  asset::Primitive sphere = scenes::sphere(vec3(0.0f), 1.0f, rings);
+  const std::vector<uvec3> sound = std::move(sphere.triangles);
+  sphere.triangles.clear();
+  for (const uvec3& t : sound) {
+    const uvec3 point(t.x), needle(t.x, t.y, t.y);
+    const auto middle = static_cast<uint32_t>(sphere.p_world.size());
+    sphere.p_world.push_back(0.5f * (sphere.p_world[t.x] + sphere.p_world[t.y]));
+    sphere.n_world.push_back(sphere.n_world[t.x]);
+    sphere.uv[0].push_back(0.5f * (sphere.uv[0][t.x] + sphere.uv[0][t.y]));
+    for (const uvec3& triangle : {point, t, needle, uvec3(t.x, middle, t.y)})
+      sphere.triangles.push_back(triangle);
   }
   return make_world({{sphere, {}}});
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "patina/base/parallel.h"
+#include "patina/views/view_set.h"
 
 namespace patina::correspond {
 
@@ -41,6 +42,22 @@ Footprints trace_footprints(const render::Scene& scene, const render::Camera& ca
     }
   });
   return out;
+}
+
+std::vector<uint8_t> surface_mask(const render::Scene& scene, std::span<const render::Camera> cameras,
+                                  int latent_scale) {
+  const auto grid = static_cast<size_t>(views::grid_of(cameras.size()));
+  std::vector<uint8_t> mask;
+  for (size_t view = 0; view < cameras.size(); ++view) {
+    const Footprints footprints = trace_footprints(scene, cameras[view], latent_scale);
+    const auto width = static_cast<size_t>(footprints.width), height = static_cast<size_t>(footprints.height);
+    mask.resize(grid * grid * width * height);
+    const size_t first = view / grid * height * grid * width + view % grid * width;
+    for (size_t y = 0; y < height; ++y)
+      for (size_t x = 0; x < width; ++x)
+        mask[first + y * grid * width + x] = footprints.coverage[y * width + x] > 0.0f;
+  }
+  return mask;
 }
 
 }  // namespace patina::correspond

@@ -1,6 +1,7 @@
 // What a latent pixel covers: how much of it shows enhanced surface, and how much surface that is.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -20,5 +21,10 @@ struct Footprints {
   std::vector<float> area;      // m² of surface in it
 };
 Footprints trace_footprints(const render::Scene& scene, const render::Camera& camera, int latent_scale);
+
+/// [height · width] of the whole grid of views: 1 where a latent pixel shows some enhanced surface. Noise
+/// there is what noise_statistics should look at; elsewhere it is independent by construction.
+std::vector<uint8_t> surface_mask(const render::Scene& scene, std::span<const render::Camera> cameras,
+                                  int latent_scale);
 
 }  // namespace patina::correspond
