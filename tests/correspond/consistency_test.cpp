@@ -1,4 +1,5 @@
 // The consistency of edits that are known to agree, to disagree, and to be shifted.
+#include <algorithm>
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -113,6 +114,111 @@ TEST_F(EditConsistency, a_known_slip_along_the_surface_costs_the_cosine_of_its_p
   EXPECT_GT(at_rest, 0.99f);
   const float step = std::cos(0.25f * kPi);
   EXPECT_NEAR(moved, (3.0f * step + 2.0f * 0.0f - step) / 6.0f, 0.05f);
+}
+
+// Cameras before the plane z = 0, moved along it by whole pixels: pixel centres see the centres of one grid
+// of squares on the plane.
+constexpr int kPlaneSide = 160;  // pixels
+constexpr float kPixel = 0.02f;  // metres on the plane
+std::vector<render::Camera> cameras_moved_by(const std::vector<int>& pixels) {
+  constexpr float kDistance = 8.0f;
+  const float fov = 2.0f * std::atan(0.5f * kPlaneSide * kPixel / kDistance);
+  std::vector<render::Camera> cameras;
+  for (const int moved : pixels) {
+    const vec3 foot(static_cast<float>(moved) * kPixel, 0, 0);
+    cameras.push_back(render::look_at(foot + vec3(0, 0, kDistance), foot, fov, kPlaneSide, kPlaneSide));
+  }
+  return cameras;
+}
+
+TEST_F(EditConsistency, a_texture_shifted_by_k_pixels_keeps_its_autocorrelation) {
+  // White squares averaged over runs of eight along x: correlation 1 − k/8 at a shift of k, in both
+  // directions.
+  constexpr int kRun = 8;
+  const World world = make_world({{scenes::quad(vec3(-4, -4, 0), vec3(8, 0, 0), vec3(0, 8, 0)), {}}});
+  const auto views = view_set(*world.scene, cameras_moved_by({0, 5, -3, 8}));
+  for (const int shift : {-8, -4, -1, 0, 1, 2, 4, 6, 8, 20}) {
+    // Views 1 and 2 see the texture shifted, so four of the six pairs differ by it.
+    const Pictures pictures = paint(views, [&](size_t view, size_t, const vec3& p) {
+      const int x = static_cast<int>(std::floor(p.x / kPixel)) + (view == 1 || view == 2 ? shift : 0);
+      const int y = static_cast<int>(std::floor(p.y / kPixel));
+      vec3 sum(0.0f);
+      for (int i = 0; i < kRun; ++i) {
+        const auto g =
+            gaussian4(1, RandomPurpose::kTest, static_cast<uint64_t>((y + 1000) * 4000 + x + i + 1000));
+        sum += 0.05f * vec3(g[0], g[1], g[2]);
+      }
+      return sum;
+    });
+    const Consistency c = edit_consistency(*world.scene, views, pictures.conditioning, pictures.edited);
+    const float shared = std::max(0.0f, 1.0f - static_cast<float>(std::abs(shift)) / kRun);
+    EXPECT_NEAR(c.edit_correlation, (2.0f + 4.0f * shared) / 6.0f, 0.02f) << "shifted by " << shift;
+    const float variance = kRun * square(0.05f);
+    if (shift != 0) {
+      EXPECT_NEAR(c.edit_psnr, -10.0f * std::log10(4.0f / 6.0f * 2.0f * variance * (1.0f - shared)), 0.2f);
+    } else {
+      EXPECT_GT(c.edit_psnr, 60.0f);
+    }
+  }
+}
+
+TEST_F(EditConsistency, pixels_count_by_the_surface_they_show) {
+  // Left a square wall, right one that is turned by 60° or stands farther off. Views agree on the left one
+  // only.
+  struct Case {
+    const char* name;
+    asset::Primitive right;
+    float left_area, right_area;  // m², of what the frame shows of it
+  };
+  const float slope = std::sqrt(3.0f);
+  for (const Case& wall :
+       {Case{"turned", scenes::quad(vec3(0.05f, -1, 0), vec3(1, 0, -slope), vec3(0, 2, 0)), 2, 4},
+        Case{"twice as far", scenes::quad(vec3(0.1f, -2, -8), vec3(2, 0, 0), vec3(0, 4, 0)), 2, 8}}) {
+    const World world =
+        make_world({{scenes::quad(vec3(-1.05f, -1, 0), vec3(1, 0, 0), vec3(0, 2, 0)), {}}, {wall.right, {}}});
+    auto views = view_set(*world.scene, {render::look_at(vec3(0, 0, 8), vec3(0.0f), 0.3f, 384, 384)});
+    views.views.resize(4, views.views[0]);
+    views.grid = 2;
+    const Pictures pictures = paint(views, [](size_t view, size_t pixel, const vec3& p) {
+      const auto g = gaussian4(p.x < 0.0f ? 99 : view, RandomPurpose::kTest, pixel);
+      return 0.1f * vec3(g[0], g[1], g[2]);
+    });
+    const Consistency c = edit_consistency(*world.scene, views, pictures.conditioning, pictures.edited);
+    // The turned wall recedes: perspective leaves what is counted of it a little short of its whole.
+    EXPECT_NEAR(c.covisible_area / 12.0, wall.left_area + wall.right_area,
+                0.08 * (wall.left_area + wall.right_area))
+        << wall.name;
+    const float share = wall.left_area / (wall.left_area + wall.right_area);
+    EXPECT_NEAR(c.edit_correlation, share, 0.02f) << wall.name;
+    EXPECT_NEAR(c.edit_psnr, -10.0f * std::log10(0.02f * (1.0f - share)), 0.15f) << wall.name;
+  }
+}
+
+TEST_F(EditConsistency, a_tint_that_all_views_share_is_no_agreement_of_detail) {
+  const Pictures pictures = paint(views_, [](size_t view, size_t pixel, const vec3&) {
+    const auto g = gaussian4(view, RandomPurpose::kTest, pixel);
+    return vec3(0.3f, -0.2f, 0.1f) + 0.05f * vec3(g[0], g[1], g[2]);
+  });
+  const Consistency c = edit_consistency(*world_.scene, views_, pictures.conditioning, pictures.edited);
+  EXPECT_NEAR(c.edit_correlation, 0.0f, 0.02f);
+}
+
+TEST_F(EditConsistency, both_directions_of_a_pair_count) {
+  // The order of the views must not matter, though one of them is far nearer than the others.
+  auto cameras = cameras_at({0, 30, 60, 90}, 192);
+  cameras[1].fov_y *= 0.4f;
+  const auto views = view_set(*world_.scene, cameras);
+  std::reverse(cameras.begin(), cameras.end());
+  const auto reversed = view_set(*world_.scene, cameras);
+  const auto edit = [](size_t, size_t, const vec3& p) { return pattern(2.0f * p); };
+  const Pictures pictures = paint(views, edit), reversed_pictures = paint(reversed, edit);
+  const Consistency c = edit_consistency(*world_.scene, views, pictures.conditioning, pictures.edited);
+  const Consistency r =
+      edit_consistency(*world_.scene, reversed, reversed_pictures.conditioning, reversed_pictures.edited);
+  EXPECT_EQ(c.covisible_pixels, r.covisible_pixels);
+  EXPECT_NEAR(c.covisible_area, r.covisible_area, 1e-6 * c.covisible_area);
+  EXPECT_NEAR(c.edit_correlation, r.edit_correlation, 1e-5f);
+  EXPECT_NEAR(c.edit_psnr, r.edit_psnr, 1e-4f);
 }
 
 TEST_F(EditConsistency, only_the_edit_counts_not_the_picture) {

@@ -20,30 +20,49 @@ constexpr int kMargin = 3;
 // two surfaces. At kMinCosine a pixel of a 35° view of 256 pixels spans 1.2 % of its distance.
 constexpr float kMaxDepthStep = 0.02f;
 
-// Sums over the co-visible pixels and channels of one ordered pair of views, for Pearson's coefficient.
+// Sums over the co-visible pixels of one ordered pair of views, each weighted by its area, for Pearson's
+// coefficient over all channels about each channel's own mean.
 struct PairSums {
-  double a = 0, b = 0, aa = 0, bb = 0, ab = 0, squared_difference = 0;
+  glm::dvec3 a{0}, b{0}, aa{0}, bb{0}, ab{0}, squared_difference{0};
+  double area = 0;
   int64_t pixels = 0;
 
-  void add(const vec3& edit_a, const vec3& edit_b) {
-    for (int channel = 0; channel < 3; ++channel) {
-      const double x = edit_a[channel], y = edit_b[channel];
-      a += x, b += y, aa += x * x, bb += y * y, ab += x * y, squared_difference += (x - y) * (x - y);
-    }
+  void add(const vec3& edit_a, const vec3& edit_b, double weight) {
+    const glm::dvec3 x(edit_a), y(edit_b);
+    a += weight * x, b += weight * y;
+    aa += weight * x * x, bb += weight * y * y, ab += weight * x * y;
+    squared_difference += weight * (x - y) * (x - y);
+    area += weight;
     ++pixels;
   }
   void add(const PairSums& other) {
     a += other.a, b += other.b, aa += other.aa, bb += other.bb, ab += other.ab;
-    squared_difference += other.squared_difference, pixels += other.pixels;
+    squared_difference += other.squared_difference, area += other.area, pixels += other.pixels;
   }
   // nullopt where one of the edits is constant: then there is nothing to correlate.
   std::optional<double> correlation() const {
-    const double n = 3.0 * static_cast<double>(pixels);
-    const double var_a = aa - a * a / n, var_b = bb - b * b / n;
-    if (!(var_a > 1e-12 * n) || !(var_b > 1e-12 * n)) return std::nullopt;
-    return (ab - a * b / n) / std::sqrt(var_a * var_b);
+    double var_a = 0, var_b = 0, covariance = 0;
+    for (int channel = 0; channel < 3; ++channel) {
+      var_a += aa[channel] / area - a[channel] / area * (a[channel] / area);
+      var_b += bb[channel] / area - b[channel] / area * (b[channel] / area);
+      covariance += ab[channel] / area - a[channel] / area * (b[channel] / area);
+    }
+    // Deviations below a hundredth of an 8-bit step are rounding.
+    constexpr double kRounding = (0.01 / 255.0) * (0.01 / 255.0);
+    if (!(var_a > kRounding) || !(var_b > kRounding)) return std::nullopt;
+    return covariance / std::sqrt(var_a * var_b);
   }
 };
+
+// Surface in m² that a pixel shows: a pixel φ off the axis spans cos³φ / f² steradians at the distance
+// depth / cos φ, and the surface leans by θ.
+double surface_area(const views::View& view, size_t pixel) {
+  const auto depth = static_cast<double>(view.gbuffer.depth[pixel]);
+  const vec3 to_point = view.gbuffer.p_world[pixel] - view.camera.position();
+  const double cos_axis = depth / static_cast<double>(glm::length(to_point));
+  const auto focal = static_cast<double>(view.camera.focal_pixels());
+  return depth * depth * cos_axis / (focal * focal * static_cast<double>(view.gbuffer.view_cosine[pixel]));
+}
 
 // Pixels that count: enhanced surface at no grazing angle, no pixel of another kind within kMargin.
 std::vector<uint8_t> counted_pixels(const views::GBuffer& gbuffer, int num_asset_primitives) {
@@ -124,8 +143,7 @@ Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& v
 
   // Row sums are kept apart and added in order, so that threads do not change the result.
   Consistency out;
-  double weighted_correlation = 0, squared_difference = 0;
-  int64_t correlated_pixels = 0;
+  double weighted_correlation = 0, correlated_area = 0, squared_difference = 0;
   for (size_t a = 0; a < num_views; ++a) {
     const views::GBuffer& from = views.views[a].gbuffer;
     const vec3 eye = views.views[a].camera.position();
@@ -139,6 +157,8 @@ Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& v
           const vec3 p_world = from.p_world[pixel];
           vec3 n_world = from.n_geometric_world[pixel];
           if (glm::dot(n_world, eye - p_world) < 0.0f) n_world = -n_world;
+          const vec3 edit = edit_at(a, pixel);
+          const double area = surface_area(views.views[a], pixel);
           for (size_t b = 0; b < num_views; ++b) {
             if (b == a) continue;
             const views::View& target = views.views[b];
@@ -155,7 +175,7 @@ Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& v
             if (!usable || !views::seen_at(scene, target.camera, p_world, n_world)) continue;
             vec3 warped(0.0f);
             for (size_t tap = 0; tap < 4; ++tap) warped += taps->weight[tap] * edit_at(b, taps->pixel[tap]);
-            rows[static_cast<size_t>(y) * num_views + b].add(edit_at(a, pixel), warped);
+            rows[static_cast<size_t>(y) * num_views + b].add(edit, warped, area);
           }
         }
       }
@@ -165,25 +185,24 @@ Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& v
       for (size_t y = 0; y < static_cast<size_t>(from.height); ++y) pair.add(rows[y * num_views + b]);
       if (pair.pixels == 0) continue;
       out.covisible_pixels += pair.pixels;
-      squared_difference += pair.squared_difference;
+      out.covisible_area += pair.area;
+      squared_difference +=
+          (pair.squared_difference.x + pair.squared_difference.y + pair.squared_difference.z) / 3.0;
       if (const auto correlation = pair.correlation()) {
-        weighted_correlation += *correlation * static_cast<double>(pair.pixels);
-        correlated_pixels += pair.pixels;
+        weighted_correlation += *correlation * pair.area;
+        correlated_area += pair.area;
       }
     }
   }
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
   out.edit_correlation =
-      correlated_pixels > 0
-          ? static_cast<float>(weighted_correlation / static_cast<double>(correlated_pixels))
-          : kNone;
-  const double mean =
-      squared_difference / (3.0 * static_cast<double>(std::max<int64_t>(out.covisible_pixels, 1)));
+      correlated_area > 0 ? static_cast<float>(weighted_correlation / correlated_area) : kNone;
   if (out.covisible_pixels == 0)
     out.edit_psnr = kNone;
+  else if (squared_difference > 0)
+    out.edit_psnr = static_cast<float>(-10.0 * std::log10(squared_difference / out.covisible_area));
   else
-    out.edit_psnr =
-        mean > 0.0 ? static_cast<float>(-10.0 * std::log10(mean)) : std::numeric_limits<float>::infinity();
+    out.edit_psnr = std::numeric_limits<float>::infinity();
   return out;
 }
 
