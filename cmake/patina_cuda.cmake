@@ -2,6 +2,15 @@
 # Included before find_package(Torch), which then enables the CUDA language and turns TORCH_CUDA_ARCH_LIST into
 # nvcc's -gencode flags.
 
+# Ampere's code runs on Ada too; Hopper's own is kept with its PTX for what comes after it.
+set(TORCH_CUDA_ARCH_LIST "8.0;9.0+PTX" CACHE STRING "Compute capabilities to compile for, as torch lists them")
+
+# CMake before 3.26 does not know that nvcc takes it.
+if(NOT DEFINED CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
+  set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION "-std=c++20")
+  set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION "-std=c++20")
+endif()
+
 find_path(PATINA_TORCH_PREFIX share/cmake/Torch/TorchConfig.cmake
   PATHS ${CMAKE_PREFIX_PATH} PATH_SUFFIXES ../.. NO_DEFAULT_PATH
   DOC "Folder of LibTorch 2.x that holds include, lib and share")

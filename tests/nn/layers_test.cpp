@@ -107,7 +107,7 @@ TEST(Attend, adds_beta_to_the_pairs_of_the_buckets) {
   const at::Tensor q = random({2, 8, 12}, 10), k = random({2, 8, 12}, 11), v = random({2, 8, 12}, 12);
   at::Tensor mask = at::zeros({8, 8}, at::kDouble);
   mask[0][2] = 1;
-  EXPECT_LT(max_difference(attend(q, k, v, 3, &buckets, 1.7f), plain_attention(q, k, v, 3, mask, 1.7f)),
+  EXPECT_LT(max_difference(attend(q, k, v, 3, {&buckets, 1.7f}), plain_attention(q, k, v, 3, mask, 1.7f)),
             2e-6);
 }
 
@@ -121,6 +121,9 @@ TEST(SelfAttentionBias, finds_its_level_by_size_and_scales_as_asked) {
   EXPECT_EQ(bias.level(4, 4), &levels[1]);
   EXPECT_EQ(bias.level(2, 2), nullptr);
   EXPECT_FLOAT_EQ(bias.beta(36), 0.5f);
+  EXPECT_EQ(bias.at(4, 4, 36).buckets, &levels[1]);
+  EXPECT_FLOAT_EQ(bias.at(4, 4, 36).beta, 0.5f);
+  EXPECT_EQ(bias.at(2, 2, 36).buckets, nullptr);
   bias.scaled_with_scores = false;
   EXPECT_FLOAT_EQ(bias.beta(36), 3.0f);
   bias.weight = 0;

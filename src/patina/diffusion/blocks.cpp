@@ -58,9 +58,9 @@ ResnetBlock load_resnet(nn::WeightReader& weights, const std::string& name, int6
 }
 
 at::Tensor Attention::operator()(const at::Tensor& x, const at::Tensor& context, const nn::Recorder& record,
-                                 const attention::KeyBuckets* buckets, float beta) const {
+                                 const nn::LevelBias& bias) const {
   const at::Tensor q = to_q(x, record), k = to_k(context, record), v = to_v(context, record);
-  return record(name, to_out_0(nn::attend(q, k, v, num_heads, buckets, beta), record));
+  return record(name, to_out_0(nn::attend(q, k, v, num_heads, bias), record));
 }
 
 at::Tensor FeedForward::operator()(const at::Tensor& x, const nn::Recorder& record) const {
@@ -72,11 +72,11 @@ at::Tensor FeedForward::operator()(const at::Tensor& x, const nn::Recorder& reco
 at::Tensor TransformerBlock::operator()(const at::Tensor& x, int64_t height, int64_t width,
                                         const Conditions& conditions) const {
   const nn::Recorder& record = conditions.record;
-  const attention::KeyBuckets* buckets = conditions.bias ? conditions.bias->level(height, width) : nullptr;
-  const float beta = buckets ? conditions.bias->beta(x.size(2) / attn1.num_heads) : 0.0f;
+  const nn::LevelBias bias =
+      conditions.bias ? conditions.bias->at(height, width, x.size(2) / attn1.num_heads) : nn::LevelBias{};
 
   const at::Tensor n1 = norm1(x, record);
-  at::Tensor h = x + attn1(n1, n1, record, buckets, beta);
+  at::Tensor h = x + attn1(n1, n1, record, bias);
   h = h + attn2(norm2(h, record), conditions.text, record);
   h = h + ff(norm3(h, record), record);
   return record(name, h);

@@ -47,7 +47,7 @@ struct Attention {
   int64_t num_heads = 1;
 
   at::Tensor operator()(const at::Tensor& x, const at::Tensor& context, const nn::Recorder& record,
-                        const attention::KeyBuckets* buckets = nullptr, float beta = 0) const;
+                        const nn::LevelBias& bias = {}) const;
 };
 
 /// Gated feed-forward: net.2(a · gelu(b)) with (a, b) = net.0.proj(x).

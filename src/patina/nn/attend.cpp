@@ -5,6 +5,8 @@
 #include <ATen/ATen.h>
 
 #include "patina/base/check.h"
+#include "patina/base/error.h"
+#include "patina/nn/attend_cuda.h"
 
 namespace patina::nn {
 namespace {
@@ -13,7 +15,38 @@ attention::Strides strides_of(const at::Tensor& x, int64_t head_dim) {
   return {x.stride(0), x.stride(1), head_dim};
 }
 
+at::Tensor attend_cpu(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
+                      const LevelBias& bias) {
+  PATINA_CHECK(q.scalar_type() == at::kFloat || q.scalar_type() == at::kBFloat16);
+  const int64_t head_dim = q.size(2) / num_heads;
+  at::Tensor out = at::empty(q.sizes(), q.options());
+  attention::Arguments arguments;
+  arguments.shape = {q.size(0), q.size(1), k.size(1), num_heads, head_dim};
+  arguments.element = q.scalar_type() == at::kFloat ? attention::Element::kF32 : attention::Element::kBf16;
+  arguments.q = q.data_ptr(), arguments.k = k.data_ptr(), arguments.v = v.data_ptr(),
+  arguments.out = out.data_ptr();
+  arguments.q_strides = strides_of(q, head_dim), arguments.k_strides = strides_of(k, head_dim);
+  arguments.v_strides = strides_of(v, head_dim), arguments.out_strides = strides_of(out, head_dim);
+  arguments.scale = 1.0f / std::sqrt(static_cast<float>(head_dim));
+  arguments.buckets = bias.buckets;
+  arguments.beta = bias.beta;
+  attention::attention_cpu(arguments);
+  return out;
+}
+
 }  // namespace
+
+#ifndef PATINA_CUDA
+std::shared_ptr<DeviceTilesCache> make_tiles_cache() {
+  return nullptr;
+}
+
+at::Tensor attend_cuda(const at::Tensor&, const at::Tensor&, const at::Tensor&, int64_t, const LevelBias&) {
+  throw Error(
+      ErrorCode::kDevice, "attention",
+      "the tensors are on a CUDA device, and this patina was built without CUDA: build the cuda preset");
+}
+#endif
 
 const attention::KeyBuckets* SelfAttentionBias::level(int64_t height, int64_t width) const {
   if (weight == 0) return nullptr;
@@ -27,29 +60,20 @@ float SelfAttentionBias::beta(int64_t head_dim) const {
   return scaled_with_scores ? weight / std::sqrt(static_cast<float>(head_dim)) : weight;
 }
 
+LevelBias SelfAttentionBias::at(int64_t height, int64_t width, int64_t head_dim) const {
+  const attention::KeyBuckets* buckets = level(height, width);
+  return buckets ? LevelBias{buckets, beta(head_dim), tiles.get()} : LevelBias{};
+}
+
 at::Tensor attend(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
-                  const attention::KeyBuckets* buckets, float beta) {
+                  const LevelBias& bias) {
   PATINA_CHECK_EQ(q.dim(), 3);
   PATINA_CHECK_EQ(q.size(2) % num_heads, 0);
   PATINA_CHECK(k.size(2) == q.size(2) && v.sizes() == k.sizes() && q.size(0) == k.size(0));
   PATINA_CHECK(q.scalar_type() == k.scalar_type() && q.scalar_type() == v.scalar_type());
-  PATINA_CHECK(q.scalar_type() == at::kFloat || q.scalar_type() == at::kBFloat16);
+  PATINA_CHECK(q.device() == k.device() && q.device() == v.device());
   PATINA_CHECK(q.stride(2) == 1 && k.stride(2) == 1 && v.stride(2) == 1);
-
-  const int64_t head_dim = q.size(2) / num_heads;
-  at::Tensor out = at::empty(q.sizes(), q.options());
-  attention::Arguments arguments;
-  arguments.shape = {q.size(0), q.size(1), k.size(1), num_heads, head_dim};
-  arguments.element = q.scalar_type() == at::kFloat ? attention::Element::kF32 : attention::Element::kBf16;
-  arguments.q = q.data_ptr(), arguments.k = k.data_ptr(), arguments.v = v.data_ptr(),
-  arguments.out = out.data_ptr();
-  arguments.q_strides = strides_of(q, head_dim), arguments.k_strides = strides_of(k, head_dim);
-  arguments.v_strides = strides_of(v, head_dim), arguments.out_strides = strides_of(out, head_dim);
-  arguments.scale = 1.0f / std::sqrt(static_cast<float>(head_dim));
-  arguments.buckets = buckets;
-  arguments.beta = beta;
-  attention::attention_cpu(arguments);
-  return out;
+  return q.is_cuda() ? attend_cuda(q, k, v, num_heads, bias) : attend_cpu(q, k, v, num_heads, bias);
 }
 
 }  // namespace patina::nn
