@@ -1,7 +1,5 @@
 #include "patina/base/error.h"
 
-#include <fmt/format.h>
-
 namespace patina {
 namespace {
 
@@ -39,7 +37,9 @@ std::string printable(std::string_view text, size_t max_length) {
       out.append(text.substr(i, n));
       i += n;
     } else {
-      out += fmt::format("\\x{:02X}", static_cast<unsigned char>(text[i++]));
+      constexpr char kDigits[] = "0123456789ABCDEF";
+      const unsigned char byte = static_cast<unsigned char>(text[i++]);
+      out += {'\\', 'x', kDigits[byte / 16], kDigits[byte % 16]};
     }
   }
   return out;
