@@ -54,7 +54,8 @@ struct Arguments {
   const void* v = nullptr;
   void* out = nullptr;  // same element type
   float* log_sum_exp =
-      nullptr;  // [batch, heads, queries] f32 of the *biased* scores, natural log; may be null
+      nullptr;  // [batch, heads, queries] f32 of the *biased* scores, natural log; may be null. As exact as
+                // f32, but for kAmxBf16, which sums rounded weights: within 2⁻⁷, 2⁻¹² over many keys
   Strides q_strides, k_strides, v_strides, out_strides;
   float scale = 0;                      // 1/√head_dim
   const KeyBuckets* buckets = nullptr;  // null: no bias. Else num_queries = num_keys = buckets->num_pixels()

@@ -53,7 +53,8 @@ bool runs_here(CpuIsa isa) {
     case CpuIsa::kAvx512Bf16:
       return has_avx512() && __builtin_cpu_supports("avx512bf16");
     case CpuIsa::kAmxBf16:
-      return has_avx512() && __builtin_cpu_supports("avx512bf16") && has_amx_bf16();
+      return has_avx512() && __builtin_cpu_supports("avx512bf16") && __builtin_cpu_supports("avx512vbmi") &&
+             has_amx_bf16();
   }
 #endif
   return isa == CpuIsa::kGeneric;

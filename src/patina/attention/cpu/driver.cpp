@@ -1,7 +1,9 @@
-// Packs keys and values once a head, cuts queries into blocks, and spreads (block, head) pairs over threads.
-// Heads are taken in groups whose packed keys and values fit kGroupBytes, so that memory stays O(tokens ·
-// head_dim) however many heads there are.
+// Packs keys and values once a head, cuts queries into blocks, and spreads (run of blocks, head) pairs over
+// threads. Heads are taken in groups whose packed keys and values fit kGroupBytes, so that memory stays
+// O(tokens · head_dim) however many heads there are. A kernel that takes panels sees the keys a panel at a
+// time, each for a whole run of blocks: a panel and the run's state stay in the second cache.
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -18,6 +20,9 @@ namespace patina::attention {
 namespace {
 
 constexpr int64_t kGroupBytes = int64_t{64} << 20;
+constexpr int64_t kPanelBytes = int64_t{512} << 10;  // packed keys and values of a panel
+constexpr int64_t kRunBytes = int64_t{768} << 10;    // packed queries and state of a run of blocks
+constexpr int64_t kPanelKeys = 128;                  // a panel is a multiple of this
 
 int64_t round_up(int64_t value, int64_t multiple) {
   return (value + multiple - 1) / multiple * multiple;
@@ -54,8 +59,8 @@ PackedSizes packed_sizes(Packing packing, int64_t num_keys, int64_t head_dim) {
       break;
     case Packing::kBf16Tiles:
       sizes.dim = round_up(head_dim, 32);
-      sizes.keys = round_up(num_keys, 32);
-      value_dim = round_up(head_dim, 16);
+      sizes.keys = round_up(num_keys, kPanelKeys);
+      value_dim = head_dim / 16 * 16 + 16;
       break;
   }
   sizes.k_bytes = round_up(sizes.keys * sizes.dim * element_bytes, 64);
@@ -74,9 +79,17 @@ void copy_row_f32(Element element, const void* source, int64_t offset, int64_t h
   }
 }
 
-/// Keys [begin, end) of one head into its packed arrays; begin is a multiple of 32, and the range that ends
-/// at num_keys writes the padding.
-void pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& sizes, int64_t k_base,
+/// Whether all are numbers below 2^kModerate in magnitude.
+bool all_moderate(const uint16_t* bf16, int64_t count) {
+  constexpr uint16_t kLimit = (127 + kModerate) << 7;
+  bool moderate = true;
+  for (int64_t i = 0; i < count; ++i) moderate &= (bf16[i] & 0x7fff) < kLimit;
+  return moderate;
+}
+
+/// Keys [begin, end) of one head into its packed arrays; begin is a multiple of 128, and the range that ends
+/// at num_keys writes the padding. Returns whether all are moderate (kBf16Tiles; else true).
+bool pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& sizes, int64_t k_base,
                       int64_t v_base, int64_t begin, int64_t end, void* k_out, void* v_out) {
   const int64_t dim = a.shape.head_dim;
   if (packing == Packing::kF32) {
@@ -84,36 +97,51 @@ void pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& si
       copy_row_f32(a.element, a.k, k_base + j * a.k_strides.token, dim, static_cast<float*>(k_out) + j * dim);
       copy_row_f32(a.element, a.v, v_base + j * a.v_strides.token, dim, static_cast<float*>(v_out) + j * dim);
     }
-    return;
+    return true;
   }
   const uint16_t* k_in = static_cast<const uint16_t*>(a.k) + k_base;
   const uint16_t* v_in = static_cast<const uint16_t*>(a.v) + v_base;
   uint16_t* k = static_cast<uint16_t*>(k_out);
   uint16_t* v = static_cast<uint16_t*>(v_out);
+  const bool tiles = packing == Packing::kBf16Tiles;
+  const int64_t value_dim = tiles ? dim / 16 * 16 + 16 : dim;
   const int64_t padded_end = end == a.shape.num_keys ? sizes.keys : end;
+  bool moderate = true;
   for (int64_t j = begin; j < padded_end; ++j) {
     const int64_t copied = j < end ? dim : 0;
-    std::memcpy(k + j * sizes.dim, k_in + (j < end ? j * a.k_strides.token : 0),
-                static_cast<size_t>(copied) * 2);
-    std::fill(k + j * sizes.dim + copied, k + (j + 1) * sizes.dim, uint16_t{0});
-  }
-  const int64_t value_dim = round_up(dim, 16);
-  for (int64_t j = begin; j < padded_end; ++j) {
-    const uint16_t* row = j < end ? v_in + j * a.v_strides.token : nullptr;
-    if (packing == Packing::kBf16Pairs) {
-      uint16_t* pair = v + (j / 2 * dim) * 2 + j % 2;
-      for (int64_t d = 0; d < dim; ++d) pair[2 * d] = row ? row[d] : uint16_t{0};
+    const uint16_t* row = k_in + (j < end ? j * a.k_strides.token : 0);
+    if (tiles) {
+      uint16_t* tile = k + j / 16 * 16 * sizes.dim + j % 16 * 32;
+      for (int64_t d = 0; d < sizes.dim; ++d) tile[d / 32 * 512 + d % 32] = d < copied ? row[d] : uint16_t{0};
+      moderate = moderate && all_moderate(row, copied);
     } else {
-      uint16_t* tile = v + j / 32 * value_dim * 32 + j % 32;
-      for (int64_t d = 0; d < value_dim; ++d) tile[32 * d] = row && d < dim ? row[d] : uint16_t{0};
+      std::memcpy(k + j * sizes.dim, row, static_cast<size_t>(copied) * 2);
+      std::fill(k + j * sizes.dim + copied, k + (j + 1) * sizes.dim, uint16_t{0});
     }
   }
+  for (int64_t j = begin; j < padded_end; ++j) {
+    const uint16_t* row = j < end ? v_in + j * a.v_strides.token : nullptr;
+    if (tiles) {
+      uint16_t* tile = v + j / 32 * value_dim * 32 + j % 32;
+      for (int64_t d = 0; d < value_dim; ++d) tile[32 * d] = row && d < dim ? row[d] : uint16_t{0};
+      if (row) {
+        tile[32 * dim] = bf16_of_float(1.0f);
+        moderate = moderate && all_moderate(row, dim);
+      }
+    } else {
+      uint16_t* pair = v + (j / 2 * dim) * 2 + j % 2;
+      for (int64_t d = 0; d < dim; ++d) pair[2 * d] = row ? row[d] : uint16_t{0};
+    }
+  }
+  return moderate;
 }
 
-void pack_queries(const Arguments& a, Packing packing, const PackedSizes& sizes, int64_t q_base,
-                  const QueryBlock& block, float scale, void* q_out) {
+/// Returns the lanes that are not moderate (kBf16Tiles).
+uint64_t pack_queries(const Arguments& a, Packing packing, const PackedSizes& sizes, int64_t q_base,
+                      const QueryBlock& block, float scale, void* q_out) {
   const int64_t dim = a.shape.head_dim;
   std::memset(q_out, 0, static_cast<size_t>(sizes.q_bytes));
+  uint64_t immoderate = 0;
   for (int lane = 0; lane < block.num_lanes(); ++lane) {
     const int64_t offset = q_base + block.query(lane) * a.q_strides.token;
     if (packing == Packing::kF32) {
@@ -124,12 +152,19 @@ void pack_queries(const Arguments& a, Packing packing, const PackedSizes& sizes,
       else
         for (int64_t d = 0; d < dim; ++d)
           q[d * kBlockQueries] = float_of_bf16(static_cast<const uint16_t*>(a.q)[offset + d]) * scale;
-    } else {
+      continue;
+    }
+    const uint16_t* row = static_cast<const uint16_t*>(a.q) + offset;
+    if (packing == Packing::kBf16Pairs) {
       uint16_t* q = static_cast<uint16_t*>(q_out) + 2 * lane;
-      for (int64_t d = 0; d < dim; ++d)
-        q[d / 2 * 2 * kBlockQueries + d % 2] = static_cast<const uint16_t*>(a.q)[offset + d];
+      for (int64_t d = 0; d < dim; ++d) q[d / 2 * 2 * kBlockQueries + d % 2] = row[d];
+    } else {
+      uint16_t* q = static_cast<uint16_t*>(q_out) + lane / 16 * 16 * sizes.dim + lane % 16 * 2;
+      for (int64_t d = 0; d < dim; ++d) q[d / 2 * 32 + d % 2] = row[d];
+      if (!all_moderate(row, dim)) immoderate |= uint64_t{1} << lane;
     }
   }
+  return immoderate;
 }
 
 void write_rows(const Arguments& a, int64_t out_base, const QueryBlock& block, const float* rows) {
@@ -161,58 +196,94 @@ void run_blocks(const Arguments& a, const Kernel& kernel) {
   const int64_t head_bytes = sizes.k_bytes + sizes.v_bytes;
   const int64_t group = std::clamp<int64_t>(kGroupBytes / head_bytes, 1, num_heads);
   const AlignedBytes packed = aligned_bytes(group * head_bytes);
+  std::vector<std::atomic<bool>> moderate(static_cast<size_t>(group));  // one a head of the group
   const auto base = [&](const Strides& s, int64_t head) {
     return head / n.num_heads * s.batch + head % n.num_heads * s.head;
   };
 
+  const int head_dim = static_cast<int>(n.head_dim);
+  const int64_t state_bytes = kernel.state_floats ? kernel.state_floats(head_dim) * 4 : 0;
+  const int64_t panel_keys =
+      kernel.takes_panels
+          ? std::max(kPanelKeys, kPanelBytes * sizes.keys / head_bytes / kPanelKeys * kPanelKeys)
+          : n.num_keys;
+  // As long a run as fits, if that leaves a few tasks to each thread; of one block where there is one panel.
+  const int64_t num_blocks = static_cast<int64_t>(blocks.size());
+  const int64_t run =
+      panel_keys >= n.num_keys
+          ? 1
+          : std::clamp<int64_t>(std::min(kRunBytes / (state_bytes + sizes.q_bytes),
+                                         num_blocks * num_heads / (int64_t{4} * num_threads())),
+                                1, num_blocks);
+  const int64_t num_runs = (num_blocks + run - 1) / run;
+
   for (int64_t head0 = 0; head0 < num_heads; head0 += group) {
     const int64_t heads = std::min(group, num_heads - head0);
     const auto keys_of = [&](int64_t head) { return packed.get() + (head - head0) * head_bytes; };
+    for (std::atomic<bool>& m : moderate) m = true;
 
-    constexpr int64_t kChunk = 1024;  // keys a task, a multiple of 32
+    constexpr int64_t kChunk = 1024;  // keys a task, a multiple of kPanelKeys
     const int64_t chunks = (n.num_keys + kChunk - 1) / kChunk;
     parallel_for(0, heads * chunks, 1, [&](int64_t begin, int64_t end) {
       for (int64_t task = begin; task < end; ++task) {
         const int64_t head = head0 + task / chunks, key0 = task % chunks * kChunk;
-        pack_keys_values(a, kernel.packing, sizes, base(a.k_strides, head), base(a.v_strides, head), key0,
-                         std::min(key0 + kChunk, n.num_keys), keys_of(head), keys_of(head) + sizes.k_bytes);
+        if (!pack_keys_values(a, kernel.packing, sizes, base(a.k_strides, head), base(a.v_strides, head),
+                              key0, std::min(key0 + kChunk, n.num_keys), keys_of(head),
+                              keys_of(head) + sizes.k_bytes))
+          moderate[static_cast<size_t>(head - head0)] = false;
       }
     });
 
-    parallel_for(0, static_cast<int64_t>(blocks.size()) * heads, 1, [&](int64_t begin, int64_t end) {
-      const AlignedBytes queries = aligned_bytes(sizes.q_bytes);
+    parallel_for(0, num_runs * heads, 1, [&](int64_t begin, int64_t end) {
+      const AlignedBytes queries = aligned_bytes(run * sizes.q_bytes),
+                         states = aligned_bytes(run * state_bytes);
       const int64_t out_floats = round_up(n.head_dim, 16) * kBlockQueries;
       const AlignedBytes work = aligned_bytes((kScratchFloats + out_floats + kBlockQueries) * 4);
       Block block;
-      block.q = queries.get();
       block.scratch = reinterpret_cast<float*>(work.get());
       block.out = block.scratch + kScratchFloats;
       block.log_sum_exp = block.out + out_floats;
       block.num_keys = n.num_keys;
-      block.head_dim = static_cast<int>(n.head_dim);
+      block.head_dim = head_dim;
       block.score_scale = kernel.packing == Packing::kF32 ? 1.0f : scale;
       block.beta = beta;
 
-      std::vector<BiasedKey> biased;
-      int64_t biased_block =
-          -1;  // whose list `biased` is: the heads of a block follow each other and share it
+      std::vector<std::vector<BiasedKey>> biased(static_cast<size_t>(run), {no_bias});
+      std::vector<uint64_t> immoderate(static_cast<size_t>(run));
+      int64_t listed_run =
+          -1;  // whose lists `biased` holds: the heads of a run follow each other and share them
       for (int64_t task = begin; task < end; ++task) {
-        const int64_t index = task / heads, head = head0 + task % heads;
-        const QueryBlock& queries_of = blocks[static_cast<size_t>(index)];
-        if (buckets && biased_block != index) {
-          biased = biased_keys_of_block(*buckets, queries_of);
-          biased_block = index;
+        const int64_t run_index = task / heads, head = head0 + task % heads;
+        const int64_t first = run_index * run, count = std::min(run, num_blocks - first);
+        const bool keys_moderate = moderate[static_cast<size_t>(head - head0)];
+        for (int64_t i = 0; i < count; ++i) {
+          const QueryBlock& queries_of = blocks[static_cast<size_t>(first + i)];
+          if (buckets && listed_run != run_index)
+            biased[static_cast<size_t>(i)] = biased_keys_of_block(*buckets, queries_of);
+          const uint64_t lanes = pack_queries(a, kernel.packing, sizes, base(a.q_strides, head), queries_of,
+                                              scale, queries.get() + i * sizes.q_bytes);
+          immoderate[static_cast<size_t>(i)] = keys_moderate ? lanes : ~uint64_t{0};
         }
-        block.biased = buckets ? biased.data() : &no_bias;
-        block.num_lanes = queries_of.num_lanes();
+        listed_run = run_index;
         block.k = keys_of(head);
         block.v = keys_of(head) + sizes.k_bytes;
-        pack_queries(a, kernel.packing, sizes, base(a.q_strides, head), queries_of, scale, queries.get());
-        kernel.attend(block);
-        write_rows(a, base(a.out_strides, head), queries_of, block.out);
-        if (a.log_sum_exp)
-          for (int lane = 0; lane < block.num_lanes; ++lane)
-            a.log_sum_exp[head * n.num_queries + queries_of.query(lane)] = block.log_sum_exp[lane];
+        for (int64_t key0 = 0; key0 < n.num_keys; key0 += panel_keys)
+          for (int64_t i = 0; i < count; ++i) {
+            const QueryBlock& queries_of = blocks[static_cast<size_t>(first + i)];
+            block.begin_key = key0;
+            block.end_key = std::min(key0 + panel_keys, n.num_keys);
+            block.num_lanes = queries_of.num_lanes();
+            block.biased = biased[static_cast<size_t>(i)].data();
+            block.immoderate_lanes = immoderate[static_cast<size_t>(i)];
+            block.q = queries.get() + i * sizes.q_bytes;
+            block.state = reinterpret_cast<float*>(states.get() + i * state_bytes);
+            kernel.attend(block);
+            if (block.end_key < n.num_keys) continue;
+            write_rows(a, base(a.out_strides, head), queries_of, block.out);
+            if (a.log_sum_exp)
+              for (int lane = 0; lane < block.num_lanes; ++lane)
+                a.log_sum_exp[head * n.num_queries + queries_of.query(lane)] = block.log_sum_exp[lane];
+          }
       }
     });
   }

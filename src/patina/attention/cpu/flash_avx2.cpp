@@ -57,7 +57,7 @@ inline void add_in_lanes(float* row, Vec8 value, uint64_t lanes) {
 }  // namespace
 
 Kernel avx2_kernel() {
-  return {Packing::kF32, attend<Vec8>};
+  return {Packing::kF32, false, nullptr, attend<Vec8>};
 }
 
 }  // namespace patina::attention

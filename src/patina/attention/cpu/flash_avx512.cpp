@@ -19,7 +19,7 @@ namespace {
 }  // namespace
 
 Kernel avx512_kernel() {
-  return {Packing::kF32, attend<Vec16>};
+  return {Packing::kF32, false, nullptr, attend<Vec16>};
 }
 
 }  // namespace patina::attention

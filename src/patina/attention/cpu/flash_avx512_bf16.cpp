@@ -77,7 +77,7 @@ struct PairProducts {
 }  // namespace
 
 Kernel avx512_bf16_kernel() {
-  return {Packing::kBf16Pairs, attend_bf16<PairProducts>};
+  return {Packing::kBf16Pairs, false, nullptr, attend_bf16<PairProducts>};
 }
 
 }  // namespace patina::attention

@@ -55,7 +55,7 @@ inline void add_in_lanes(float* row, Vec4 value, uint64_t lanes) {
 }  // namespace
 
 Kernel generic_kernel() {
-  return {Packing::kF32, attend<Vec4>};
+  return {Packing::kF32, false, nullptr, attend<Vec4>};
 }
 
 }  // namespace patina::attention
