@@ -8,7 +8,7 @@ DEMO_DIR := build/demo
 DEMO_MODEL ?= tests/data/tiny-sd
 DEMO_PROMPT ?= a rusty old kettle
 
-.PHONY: build check demo setup bench-programs clean format tidy
+.PHONY: build check demo setup bench-programs bench-noise clean format tidy
 
 setup:
 	@scripts/setup.sh
@@ -36,6 +36,11 @@ demo: build
 bench-programs: setup
 	@cmake --preset release -DPATINA_BUILD_BENCH=ON
 	@cmake --build build/release --parallel $(JOBS)
+
+bench-noise: setup
+	@cmake --preset release -DPATINA_BUILD_BENCH=ON
+	@cmake --build build/release --parallel $(JOBS) --target bench_noise
+	build/release/bench_noise --out build/bench/noise.json
 
 format:
 	git ls-files '*.cpp' '*.h' | xargs clang-format -i

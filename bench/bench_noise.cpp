@@ -1,33 +1,39 @@
-// View-correlated noise over all shared assets that have UVs: whiteness, how much of the possible correlation
-// between views each mode reaches, and seconds for nine 512² views (noise and correspondences).
-//   bench_noise [OUT.json]      default: bench/noise.json beside the program; assets from $PATINA_SHARED,
-//   else ../shared
+// View-correlated noise on real assets: whiteness, how much of the possible correlation between views each
+// mode reaches, and seconds.
+//
+//   bench_noise [--out FILE] [--only TEXT] [--seeds N]   every asset with UVs, or those whose path holds TEXT
+//   bench_noise --sweep ASSET                            share of the bound against samples a latent pixel
+//   bench_noise --picture ASSET OUT.png [VIEWS]          two neighbours of VIEWS (default 51) views a turn
+//
+// Assets are those of $PATINA_SHARED, else ../shared; FILE is build/bench/noise.json unless given. Takes some
+// five minutes on two cores. What the figures mean: docs/noise.md.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <vector>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
+#include "noise_measure.h"
+#include "noise_picture.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/parallel.h"
-#include "patina/correspond/correspondences.h"
-#include "patina/correspond/noise.h"
-#include "patina/correspond/noise_agreement.h"
-#include "patina/views/view_set.h"
+#include "patina/correspond/footprint.h"
+#include "patina/image/image_io.h"
 
 namespace {
 
 using namespace patina;
-using Clock = std::chrono::steady_clock;
+using namespace patina::bench;
+namespace fs = std::filesystem;
+using nlohmann::json;
 
-std::vector<std::filesystem::path> asset_files(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> out;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    const auto extension = entry.path().extension();
+std::vector<fs::path> asset_files(const fs::path& folder) {
+  std::vector<fs::path> out;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const fs::path extension = entry.path().extension();
     if (extension == ".gltf" || extension == ".glb" || extension == ".obj") out.push_back(entry.path());
   }
   std::sort(out.begin(), out.end());
@@ -39,97 +45,207 @@ bool has_uvs(const asset::Asset& asset) {
                      [](const asset::Primitive& p) { return !p.uv.empty() && !p.uv[0].empty(); });
 }
 
-// Sums of measured correlation and bound over pairs of views; their ratio is the share of the bound.
-double share_of_bound(const render::Scene& scene, const std::vector<render::Camera>& cameras,
-                      correspond::NoiseMode mode, const std::vector<std::pair<int, int>>& pairs) {
-  std::vector<correspond::NoiseField> noises;
-  for (uint64_t seed = 1; seed <= 2; ++seed)
-    noises.push_back(correspond::make_noise(scene, cameras, 8, {mode, 1024, seed}));
-  double correlation = 0, bound = 0;
-  for (const auto& [from, to] : pairs) {
-    const auto agreement = correspond::noise_agreement(scene, cameras, 8, noises, from, to);
-    correlation += agreement.correlation * static_cast<double>(agreement.num_pairs);
-    bound += agreement.bound * static_cast<double>(agreement.num_pairs);
-  }
-  return bound > 0 ? correlation / bound : 0;
+json pair_of(const Range& range) {
+  return json::array({range.lo, range.hi});
 }
 
-nlohmann::json measure(const asset::Asset& asset) {
-  const render::Scene scene(asset, asset::resolve_materials(asset), render::constant_environment(vec3(1.0f)));
-  const auto bounds = asset::bounds(asset);
-  const auto cameras = views::orbit_cameras(bounds, {});  // nine views of 512², 40° apart
-  views::OrbitOptions fine;
-  fine.num_views = 51;  // 7.06° apart, of which four are used
-  auto close = views::orbit_cameras(bounds, fine);
-  close.resize(4);
+json to_json(const AssetRow& row) {
+  return {{"triangles", row.num_triangles},
+          {"mean_range", pair_of(row.whiteness.mean)},
+          {"variance_range", pair_of(row.whiteness.variance)},
+          {"max_autocorrelation", row.whiteness.max_autocorrelation},
+          {"smallest_ks_p", row.whiteness.smallest_ks_p},
+          {"exact_of_bound", row.exact.value},
+          {"exact_of_bound_deviation", row.exact.deviation},
+          {"paper_of_bound", row.paper.value},
+          {"mean_bound", row.exact.mean_bound},
+          {"pairs_of_latents", row.exact.num_pairs},
+          {"exact_of_bound_7deg", row.exact_close.value},
+          {"paper_of_bound_7deg", row.paper_close.value},
+          {"texels_across_latent", row.texels_across},
+          {"seconds_noise_9x512", row.seconds_noise},
+          {"seconds_correspondences_9x512", row.seconds_correspondences},
+          {"seconds_9x512", row.seconds_noise + row.seconds_correspondences},
+          {"seconds_16x1024", row.seconds_16x1024},
+          {"seconds_consistency_9x512", row.seconds_consistency}};
+}
 
-  const auto start = Clock::now();
-  const auto noise = correspond::make_noise(scene, cameras, 8, {});
-  const auto between = Clock::now();
-  const auto levels = correspond::bias_levels(scene, cameras);
-  const auto end = Clock::now();
+// What all assets say together: extremes, and means over assets that count alike.
+struct Summary {
+  Whiteness whiteness;
+  double exact = 0, paper = 0, exact_close = 0, paper_close = 0, largest_deviation = 0;
+  int num_assets = 0, num_left_out = 0;
+  double seconds_9x512 = 0, seconds_16x1024 = 0, seconds_consistency = 0;
 
-  double mean = 0, variance = 0, autocorrelation = 0, smallest_p = 1;
-  const auto statistics = correspond::noise_statistics(noise, 3);
-  for (const auto& s : statistics) {
-    mean += static_cast<double>(s.mean) / 9.0;
-    variance += static_cast<double>(s.variance) / 9.0;
-    for (const float a : {s.autocorrelation_x, s.autocorrelation_y})
-      autocorrelation = std::max(autocorrelation, std::abs(static_cast<double>(a)));
-    smallest_p = std::min(smallest_p, static_cast<double>(s.kolmogorov_smirnov_p));
+  void add(const AssetRow& row) {
+    whiteness.add(row.whiteness);
+    exact += row.exact.value, paper += row.paper.value;
+    exact_close += row.exact_close.value, paper_close += row.paper_close.value;
+    largest_deviation = std::max(largest_deviation, row.exact.deviation);
+    seconds_9x512 = std::max(seconds_9x512, row.seconds_noise + row.seconds_correspondences);
+    seconds_16x1024 = std::max(seconds_16x1024, row.seconds_16x1024);
+    seconds_consistency = std::max(seconds_consistency, row.seconds_consistency);
+    ++num_assets;
   }
-  const std::vector<std::pair<int, int>> far{{0, 1}, {3, 4}, {6, 7}}, near{{0, 1}, {1, 2}, {2, 3}};
+
+  json to_json(int num_seeds) const {
+    const auto n = static_cast<double>(std::max(num_assets, 1));
+    const double numbers = 4.0 * 64 * 64 * num_seeds;  // of one view over all seeds
+    return {{"exact_of_bound", exact / n},
+            {"paper_of_bound", paper / n},
+            {"max_autocorrelation", whiteness.max_autocorrelation},
+            {"variance_range", pair_of(whiteness.variance)},
+            {"seconds_9x512", seconds_9x512},
+            {"mean_range", pair_of(whiteness.mean)},
+            {"smallest_ks_p", whiteness.smallest_ks_p},
+            {"details",
+             {{"num_assets", num_assets},
+              {"num_left_out", num_left_out},
+              {"num_threads", num_threads()},
+              {"num_seeds", num_seeds},
+              // By chance alone, for a view's mean over all seeds.
+              {"deviation_of_mean", std::sqrt(1.0 / numbers)},
+              {"deviation_of_variance", std::sqrt(2.0 / numbers)},
+              {"deviation_of_autocorrelation", std::sqrt(1.0 / numbers)},
+              {"largest_deviation_of_exact_of_bound", largest_deviation},
+              {"ks_tests", whiteness.ks_tests},
+              // That the smallest of so many independent p-values is as small.
+              {"ks_p_of_smallest",
+               1.0 - std::pow(1.0 - whiteness.smallest_ks_p, static_cast<double>(whiteness.ks_tests))},
+              {"exact_of_bound_7deg", exact_close / n},
+              {"paper_of_bound_7deg", paper_close / n},
+              {"seconds_16x1024", seconds_16x1024},
+              {"seconds_consistency_9x512", seconds_consistency}}}};
+  }
+};
+
+int measure_all(const fs::path& assets, const fs::path& out, const std::string& only, int num_seeds) {
+  std::vector<fs::path> files = asset_files(assets);
+  std::erase_if(files, [&](const fs::path& file) { return file.string().find(only) == std::string::npos; });
+  std::printf("%d threads, %d seeds; shares of the bound over all pairs of nine views, and at 7 degrees\n",
+              num_threads(), num_seeds);
+  std::printf("%7s %-36s %13s %6s %7s  %6s %6s  %6s %6s %6s  %5s %5s %5s\n", "", "asset", "variance", "autoc",
+              "ks p", "exact", "paper", "exact7", "paper7", "texels", "9x512", "16x1k", "cons.");
+  Summary summary;
+  json rows = json::array();
+  for (size_t i = 0; i < files.size(); ++i) {
+    const std::string name = fs::relative(files[i], assets).string();
+    std::printf("[%2zu/%2zu] %-36.36s ", i + 1, files.size(), name.c_str());
+    std::fflush(stdout);
+    std::string left_out;
+    try {
+      const asset::Asset asset = asset::read_asset(files[i]);
+      if (has_uvs(asset)) {
+        const AssetRow row = measure_asset(asset, num_seeds);
+        std::printf("%6.4f %6.4f %6.4f %7.5f  %6.3f %6.3f  %6.3f %6.3f %6.1f  %5.2f %5.2f %5.2f\n",
+                    row.whiteness.variance.lo, row.whiteness.variance.hi, row.whiteness.max_autocorrelation,
+                    row.whiteness.smallest_ks_p, row.exact.value, row.paper.value, row.exact_close.value,
+                    row.paper_close.value, row.texels_across, row.seconds_noise + row.seconds_correspondences,
+                    row.seconds_16x1024, row.seconds_consistency);
+        summary.add(row);
+        rows.push_back(to_json(row));
+        rows.back()["asset"] = name;
+      } else {
+        left_out = "no UVs";
+      }
+    } catch (const Error& error) {
+      left_out = error.what();
+    }
+    if (left_out.empty()) continue;
+    std::printf("left out: %s\n", left_out.c_str());
+    ++summary.num_left_out;
+    rows.push_back({{"asset", name}, {"left_out", left_out}});
+  }
+  json all = summary.to_json(num_seeds);
+  std::printf("%s\n", all.dump(1).c_str());
+  all["assets"] = std::move(rows);
+  write_file(out, all.dump(1));
+  std::printf("wrote %s\n", out.c_str());
+  return summary.num_assets > 0 ? 0 : 1;
+}
+
+// Share of the bound, whiteness on the surface and cost of nine 512² views against samples a latent pixel.
+int sweep(const fs::path& file) {
+  constexpr int kSeeds = 64;
+  const asset::Asset asset = asset::read_asset(file);
+  const render::Scene scene(asset, asset::resolve_materials(asset), render::constant_environment(vec3(1.0f)));
+  const auto cameras = orbit(asset, 9, 512, 9), close = orbit(asset, 51, 512, 4);
+  const auto pairs = shared_by_all(scene, cameras, 32), close_pairs = shared_by_all(scene, close, 32);
+  const auto surface = correspond::surface_mask(scene, cameras, kLatentScale);
+  std::printf("%s: a latent pixel covers %.1f of the 1024 texels across\n", file.c_str(),
+              texels_across(scene, cameras, 1024));
+  std::printf("%-22s %8s %8s %16s %8s %8s\n", "samples a latent pixel", "7 deg", "40+ deg", "variance",
+              "autoc", "seconds");
+  const auto print_row = [&](const std::string& name, const correspond::NoiseOptions& options) {
+    const double seconds =
+        best_seconds_of(3, [&] { correspond::make_noise(scene, cameras, kLatentScale, options); });
+    const auto noises = correspond::make_noises(scene, cameras, kLatentScale, options, seeds(kSeeds));
+    const auto close_noises = correspond::make_noises(scene, close, kLatentScale, options, seeds(kSeeds));
+    const Whiteness whiteness = measure_whiteness(noises, 3, surface);
+    std::printf("%-22s %8.3f %8.3f %7.4f %8.4f %8.4f %8.3f\n", name.c_str(),
+                share_of_bound(close_pairs, close_noises, 2).value, share_of_bound(pairs, noises, 3).value,
+                whiteness.variance.lo, whiteness.variance.hi, whiteness.max_autocorrelation, seconds);
+    std::fflush(stdout);
+  };
   using enum correspond::NoiseMode;
-  return {{"mean", mean},
-          {"variance", variance},
-          {"autocorrelation_worst", autocorrelation},
-          {"ks_p_smallest", smallest_p},
-          {"exact_of_bound_7deg", share_of_bound(scene, close, kExact, near)},
-          {"paper_of_bound_7deg", share_of_bound(scene, close, kPaper, near)},
-          {"exact_of_bound", share_of_bound(scene, cameras, kExact, far)},
-          {"paper_of_bound", share_of_bound(scene, cameras, kPaper, far)},
-          {"biased_keys", levels[0].keys.size()},
-          {"seconds_noise", std::chrono::duration<double>(between - start).count()},
-          {"seconds_9x512", std::chrono::duration<double>(end - start).count()}};
+  for (const int subpixels : {4, 8, 16, 32, 64})
+    print_row("paper, " + std::to_string(subpixels) + " x " + std::to_string(subpixels),
+              {.mode = kPaper, .subpixels = subpixels});
+  for (const int points : {3, 12, 24, 48, 96, 192})
+    print_row("exact, " + std::to_string(points) + " points",
+              {.mode = kExact, .points_per_latent = static_cast<float>(points)});
+  return 0;
+}
+
+int usage() {
+  std::fprintf(stderr,
+               "usage: bench_noise [--out FILE] [--only TEXT] [--seeds N]\n"
+               "       bench_noise --sweep ASSET\n"
+               "       bench_noise --picture ASSET OUT.png [VIEWS]\n");
+  return 2;
+}
+
+int run(const std::vector<std::string>& arguments) {
+  const char* shared = std::getenv("PATINA_SHARED");
+  const fs::path assets = fs::path(shared ? shared : "../shared") / "assets";
+  fs::path out = "build/bench/noise.json";
+  std::string only;
+  int num_seeds = 32;
+  for (size_t i = 0; i < arguments.size(); ++i) {
+    const size_t left = arguments.size() - i - 1;
+    if (arguments[i] == "--sweep" && left == 1) return sweep(arguments[i + 1]);
+    if (arguments[i] == "--picture" && (left == 2 || left == 3)) {
+      const int views = left == 3 ? std::stoi(arguments[i + 3]) : 51;
+      write_image(arguments[i + 2], noise_picture(asset::read_asset(arguments[i + 1]), views));
+      return 0;
+    }
+    if (left < 1) return usage();
+    const std::string& value = arguments[i + 1];
+    if (arguments[i] == "--out")
+      out = value;
+    else if (arguments[i] == "--only")
+      only = value;
+    else if (arguments[i] == "--seeds")
+      num_seeds = std::max(std::stoi(value), 1);
+    else
+      return usage();
+    ++i;
+  }
+  if (!fs::exists(assets)) {
+    std::fprintf(stderr, "%s does not exist; set PATINA_SHARED to the folder that holds assets/\n",
+                 assets.c_str());
+    return 1;
+  }
+  return measure_all(assets, out, only, num_seeds);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const char* shared = std::getenv("PATINA_SHARED");
-  const std::filesystem::path assets = std::filesystem::path(shared ? shared : "../shared") / "assets";
-  const std::filesystem::path out =
-      argc > 1 ? std::filesystem::path(argv[1])
-               : std::filesystem::path(argv[0]).parent_path() / "bench" / "noise.json";
-  if (!std::filesystem::exists(assets)) {
-    std::fprintf(stderr, "%s does not exist; set PATINA_SHARED to the folder that holds assets/\n",
-                 assets.c_str());
+  try {
+    return run({argv + 1, argv + argc});
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_noise: %s\n", error.what());
     return 1;
   }
-  nlohmann::json rows = nlohmann::json::array();
-  std::printf("%d threads; shares of the bound at 7° and 40°\n", num_threads());
-  std::printf("%-42s %7s %7s %7s %7s  %6s %6s  %6s %6s  %6s\n", "asset", "mean", "var", "autoc", "ks p",
-              "exact7", "paper7", "exact", "paper", "s");
-  for (const auto& path : asset_files(assets)) {
-    const std::string name = std::filesystem::relative(path, assets).string();
-    try {
-      const asset::Asset asset = asset::read_asset(path);
-      if (!has_uvs(asset)) continue;
-      nlohmann::json row = measure(asset);
-      row["asset"] = name;
-      std::printf("%-42.42s %7.4f %7.4f %7.4f %7.4f  %6.3f %6.3f  %6.3f %6.3f  %6.2f\n", name.c_str(),
-                  row["mean"].get<double>(), row["variance"].get<double>(),
-                  row["autocorrelation_worst"].get<double>(), row["ks_p_smallest"].get<double>(),
-                  row["exact_of_bound_7deg"].get<double>(), row["paper_of_bound_7deg"].get<double>(),
-                  row["exact_of_bound"].get<double>(), row["paper_of_bound"].get<double>(),
-                  row["seconds_9x512"].get<double>());
-      std::fflush(stdout);
-      rows.push_back(std::move(row));
-    } catch (const Error& error) {
-      std::printf("%-42.42s skipped: %s\n", name.c_str(), error.what());
-    }
-  }
-  write_file(out, rows.dump(1));
-  std::printf("wrote %s\n", out.c_str());
-  return 0;
 }

@@ -11,7 +11,7 @@ float area_per_pixel(const render::Camera& camera, const render::Ray& ray, const
   // A pixel at angle φ off the axis spans cos³φ / f² steradians, f in pixels.
   const float cos_axis = -glm::dot(ray.direction, vec3(camera.world_from_camera[2]));
   const float solid_angle = cos_axis * cos_axis * cos_axis / square(camera.focal_pixels());
-  return square(front.hit.t) * solid_angle / std::max(front.cosine, 0.05f);
+  return square(front.hit.t) * solid_angle / std::max(front.cosine, 0.001f);
 }
 
 Footprints trace_footprints(const render::Scene& scene, const render::Camera& camera, int latent_scale) {

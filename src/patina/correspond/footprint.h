@@ -11,7 +11,7 @@
 namespace patina::correspond {
 
 /// Surface area in m² that one square pixel sees through `ray` at `front`: t² dω / cos θ, with the solid
-/// angle of an off-axis pixel. Grazing hits count at most twenty times their projected area.
+/// angle of an off-axis pixel. Grazing hits count at most a thousand times their projected area.
 float area_per_pixel(const render::Camera& camera, const render::Ray& ray, const views::FrontHit& front);
 
 /// Latent pixels of one view, [height, width] row by row, by 4 × 4 rays each.
