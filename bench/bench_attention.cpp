@@ -1,59 +1,43 @@
-// attention_cpu on every instruction set, dense and biased, against the core's own multiply-add peak measured
-// in the same run. Prints a table and writes it to attention.json beside the program (or to the path given).
+// The attention of a U-Net over nine views of 512² of a real asset, dense and biased; beside the processor's
+// own peak and LibTorch's attention on the same tensors, all in one run. Prints tables and writes
+// attention.json.
+//   bench_attention [OUT.json [ASSET]]      default: bench/attention.json beside the program,
+//   examples/kettle.glb
 //
-// Useful operations are 4 · queries · keys · head_dim (two products); the exponentials, padding and bias
-// count nothing. Rates are per core: CPU seconds of the process, the best of some runs, so that other load on
-// the machine disturbs little.
+// Useful operations are 4 · queries · keys · head_dim (two products); exponentials, padding and bias count
+// nothing. Rates of kernels are of one core: CPU seconds of the process, the best of some runs. The
+// comparison with LibTorch is wall clock on all cores.
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "libtorch_attention.h"
 #include "matrix_peak.h"
+#include "patina/asset/material_maps.h"
 #include "patina/attention/attention.h"
 #include "patina/base/files.h"
-#include "patina/base/math.h"
 #include "patina/base/parallel.h"
 #include "patina/base/random.h"
+#include "patina/correspond/correspondences.h"
+#include "patina/views/view_set.h"
 
 namespace {
 
 using namespace patina;
 using namespace patina::attention;
 
-/// Buckets as views of a cylinder give them, at equal steps of azimuth: the object covers the middle 80 % of
-/// each view, and a key lands in another view where its surface point faces it.
-KeyBuckets cylinder_buckets(int grid, int view_size, int window_radius) {
-  KeyBuckets buckets;
-  buckets.grid = grid;
-  buckets.view_width = buckets.view_height = view_size;
-  buckets.window_radius = window_radius;
-  const int views = grid * grid;
-  std::vector<std::vector<int32_t>> cells(static_cast<size_t>(buckets.num_pixels()));
-  for (int32_t key = 0; key < buckets.num_pixels(); ++key) {
-    const int x = key % buckets.width(), y = key / buckets.width();
-    const float u = (static_cast<float>(x % view_size) + 0.5f) / static_cast<float>(view_size) * 2 - 1;
-    const float v = (static_cast<float>(y % view_size) + 0.5f) / static_cast<float>(view_size) * 2 - 1;
-    if (std::abs(u) > 0.8f || std::abs(v) > 0.8f) continue;
-    const int own = y / view_size * grid + x / view_size;
-    for (int view = 0; view < views; ++view) {
-      const float angle =
-          std::asin(u / 0.8f) + 2 * kPi * static_cast<float>(own - view) / static_cast<float>(views);
-      if (view == own || std::cos(angle) < 0.1f) continue;
-      const int column = static_cast<int>((0.8f * std::sin(angle) + 1) / 2 * static_cast<float>(view_size));
-      const int cell_x = view % grid * view_size + column, cell_y = view / grid * view_size + y % view_size;
-      cells[static_cast<size_t>(cell_y) * static_cast<size_t>(buckets.width()) + static_cast<size_t>(cell_x)]
-          .push_back(key);
-    }
-  }
-  buckets.offsets.push_back(0);
-  for (const std::vector<int32_t>& cell : cells) {
-    buckets.keys.insert(buckets.keys.end(), cell.begin(), cell.end());
-    buckets.offsets.push_back(static_cast<int32_t>(buckets.keys.size()));
-  }
-  return buckets;
+constexpr float kBeta = 1.2f;  // the command line's default weight, unscaled
+
+std::vector<KeyBuckets> buckets_of(const std::filesystem::path& path) {
+  const asset::Asset asset = asset::read_asset(path);
+  const render::Scene scene(asset, asset::resolve_materials(asset), render::constant_environment(vec3(1.0f)));
+  return correspond::bias_levels(scene, views::orbit_cameras(asset::bounds(asset), {}));
 }
 
 /// Share of all pairs that are biased, from a sample of queries.
@@ -65,50 +49,78 @@ double biased_share(const KeyBuckets& buckets) {
   return count / samples / static_cast<double>(buckets.num_pixels());
 }
 
-struct Case {
-  CpuIsa isa;
-  Element element;
-  int64_t heads, head_dim;
-  const KeyBuckets* buckets;
-  int runs;
-};
+/// Gaussian q, k, v and room for the output, [heads, tokens, head_dim] in both element types.
+struct Tensors {
+  int64_t heads, tokens, head_dim;
+  std::vector<float> f32[4];
+  std::vector<uint16_t> bf16[4];
 
-/// Best process CPU seconds of one call.
-double measure(const Case& c, float beta) {
-  const int64_t tokens = c.buckets->num_pixels();
-  const size_t size = static_cast<size_t>(tokens * c.heads * c.head_dim);
-  std::vector<std::vector<float>> f32(4, std::vector<float>(size));
-  std::vector<std::vector<uint16_t>> bf16(4, std::vector<uint16_t>(size));
-  for (uint32_t tensor = 0; tensor < 3; ++tensor)
-    for (size_t i = 0; i + 4 <= size; i += 4) {
-      const std::array<float, 4> values = gaussian4(1, RandomPurpose::kTest, i, tensor);
-      for (size_t e = 0; e < 4; ++e) {
-        f32[tensor][i + e] = values[e];
-        bf16[tensor][i + e] = static_cast<uint16_t>(std::bit_cast<uint32_t>(values[e]) >> 16);
+  Tensors(int64_t num_heads, int64_t num_tokens, int64_t dim)
+      : heads(num_heads), tokens(num_tokens), head_dim(dim) {
+    const size_t size = static_cast<size_t>(heads * tokens * head_dim);
+    for (uint32_t tensor = 0; tensor < 4; ++tensor) {
+      f32[tensor].resize(size);
+      bf16[tensor].resize(size);
+      for (size_t i = 0; tensor < 3 && i + 4 <= size; i += 4) {
+        const std::array<float, 4> values = gaussian4(1, RandomPurpose::kTest, i, tensor);
+        for (size_t e = 0; e < 4; ++e) {
+          f32[tensor][i + e] = values[e];
+          bf16[tensor][i + e] = static_cast<uint16_t>(std::bit_cast<uint32_t>(values[e]) >> 16);
+        }
       }
     }
-  const auto data = [&](size_t tensor) -> void* {
-    return c.element == Element::kF32 ? static_cast<void*>(f32[tensor].data()) : bf16[tensor].data();
-  };
-  Arguments arguments;
-  arguments.shape = {1, tokens, tokens, c.heads, c.head_dim};
-  arguments.element = c.element;
-  arguments.q = data(0);
-  arguments.k = data(1);
-  arguments.v = data(2);
-  arguments.out = data(3);
-  arguments.q_strides = arguments.k_strides = arguments.v_strides =
-      arguments.out_strides = {tokens * c.heads * c.head_dim, c.heads * c.head_dim, c.head_dim};
-  arguments.scale = 1 / std::sqrt(static_cast<float>(c.head_dim));
-  arguments.buckets = beta != 0 ? c.buckets : nullptr;
-  arguments.beta = beta;
-  double best = 1e30;
-  for (int run = 0; run < c.runs; ++run) {
-    const double start = bench::process_seconds();
-    attention_cpu(arguments, c.isa);
-    best = std::min(best, bench::process_seconds() - start);
+  }
+  Arguments arguments(Element element, const KeyBuckets* buckets) {
+    const auto data = [&](int tensor) -> void* {
+      return element == Element::kF32 ? static_cast<void*>(f32[tensor].data()) : bf16[tensor].data();
+    };
+    Arguments a;
+    a.shape = {1, tokens, tokens, heads, head_dim};
+    a.element = element;
+    a.q = data(0);
+    a.k = data(1);
+    a.v = data(2);
+    a.out = data(3);
+    a.q_strides = a.k_strides = a.v_strides =
+        a.out_strides = {heads * tokens * head_dim, head_dim, tokens * head_dim};
+    a.scale = 1 / std::sqrt(static_cast<float>(head_dim));
+    a.buckets = buckets;
+    a.beta = buckets ? kBeta : 0;
+    return a;
+  }
+  double operations() const { return 4e-9 * static_cast<double>(tokens * tokens * head_dim * heads); }
+};
+
+struct Times {
+  double dense = std::numeric_limits<double>::infinity(), biased = dense;
+};
+
+/// Best CPU seconds, dense and biased runs in turn so that both see the same machine.
+Times measure(Tensors& tensors, Element element, CpuIsa isa, const KeyBuckets& buckets, int runs) {
+  Times best;
+  for (int run = 0; run < runs; ++run) {
+    double start = bench::process_seconds();
+    attention_cpu(tensors.arguments(element, nullptr), isa);
+    best.dense = std::min(best.dense, bench::process_seconds() - start);
+    start = bench::process_seconds();
+    attention_cpu(tensors.arguments(element, &buckets), isa);
+    best.biased = std::min(best.biased, bench::process_seconds() - start);
   }
   return best;
+}
+
+double wall_seconds(Tensors& tensors, int runs) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int run = 0; run < runs; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    attention_cpu(tensors.arguments(Element::kBf16, nullptr));
+    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return best;
+}
+
+const char* name_of(Element element) {
+  return element == Element::kF32 ? "f32" : "bf16";
 }
 
 }  // namespace
@@ -117,47 +129,102 @@ int main(int argc, char** argv) {
   const std::filesystem::path report =
       argc > 1 ? std::filesystem::path(argv[1])
                : std::filesystem::path(argv[0]).parent_path() / "bench" / "attention.json";
+  const std::filesystem::path asset = argc > 2 ? argv[2] : "examples/kettle.glb";
+  const int threads = num_threads();
+  std::printf("%s from nine views of 512²; %d threads; LibTorch %s\n", asset.c_str(), threads,
+              bench::libtorch_version().c_str());
+  const std::vector<KeyBuckets> levels = buckets_of(asset);
+
+  nlohmann::json json;
+  const CpuIsa best_isa = supported_isas(Element::kBf16).back();
+  const double peak = bench::matrix_peak_gflops(best_isa);
+  json["matrix_peak_gflops"] = peak;
+  json["matrix_peak_of"] = name_of(best_isa);
+  if (best_isa == CpuIsa::kAmxBf16) json["loaded_tile_gflops"] = bench::loaded_tile_gflops();
+  json["libtorch_matmul_gflops"] = bench::libtorch_matmul_gflops(2048, 1);
+  std::printf("one core: %.0f GFLOP/s peak of %s", peak, name_of(best_isa));
+  if (json.contains("loaded_tile_gflops"))
+    std::printf(", %.0f with Gaussian operands from the first cache",
+                json["loaded_tile_gflops"].get<double>());
+  std::printf("; LibTorch's 2048³ bf16 product %.0f\n\n", json["libtorch_matmul_gflops"].get<double>());
+
+  // The U-Net's own sizes: levels 1 to 3 of Stable Diffusion 1.5.
   set_num_threads(1);
-  const KeyBuckets four_views = cylinder_buckets(4, 16, 2), nine_views = cylinder_buckets(3, 64, 4);
+  std::printf("%-12s %-5s %6s %4s %5s %9s %6s %9s %7s\n", "kernel", "type", "tokens", "dim", "heads",
+              "GFLOP/s", "share", "biased", "ratio");
+  const struct {
+    size_t level;
+    int64_t head_dim, heads;
+  } sizes[] = {{0, 40, 1}, {1, 80, 4}, {2, 160, 8}};
+  double dense_total = 0, biased_total = 0;
+  for (const Element element : {Element::kBf16, Element::kF32})
+    for (const CpuIsa isa : supported_isas(element)) {
+      const double isa_peak = bench::matrix_peak_gflops(isa);
+      const bool is_best = isa == supported_isas(element).back();
+      for (const auto& size : sizes) {
+        const KeyBuckets& buckets = levels[size.level];
+        if (!is_best && size.level == 0) continue;  // minutes, and the second level shows the same
+        Tensors tensors(is_best ? size.heads : 1, buckets.num_pixels(), size.head_dim);
+        const Times times = measure(tensors, element, isa, buckets, is_best ? 5 : 2);
+        const double rate = tensors.operations() / times.dense, share = rate / isa_peak;
+        std::printf("%-12s %-5s %6lld %4lld %5lld %9.1f %6.3f %9.1f %7.3f\n", name_of(isa), name_of(element),
+                    static_cast<long long>(tensors.tokens), static_cast<long long>(size.head_dim),
+                    static_cast<long long>(tensors.heads), rate, share, tensors.operations() / times.biased,
+                    times.biased / times.dense);
+        std::fflush(stdout);
+        json["kernels"].push_back({{"isa", name_of(isa)},
+                                   {"element", name_of(element)},
+                                   {"tokens", tensors.tokens},
+                                   {"heads", tensors.heads},
+                                   {"head_dim", size.head_dim},
+                                   {"biased_share", biased_share(buckets)},
+                                   {"dense_gflops", rate},
+                                   {"biased_gflops", tensors.operations() / times.biased},
+                                   {"peak_gflops", isa_peak},
+                                   {"share_of_peak", share},
+                                   {"biased_over_dense", times.biased / times.dense}});
+        if (element != Element::kBf16 || !is_best) continue;
+        const std::string dim = std::to_string(size.head_dim);
+        json["dense_fraction_of_peak"][dim] = share;
+        json["biased_over_dense_by_head_dim"][dim] = times.biased / times.dense;
+        // All eight heads of a level.
+        dense_total += times.dense * 8 / static_cast<double>(size.heads);
+        biased_total += times.biased * 8 / static_cast<double>(size.heads);
+      }
+    }
+  json["biased_over_dense"] = biased_total / dense_total;
+  std::printf("biased over dense, all three levels: %.3f\n\n", biased_total / dense_total);
 
-  std::vector<Case> cases;
-  for (const Element element : {Element::kF32, Element::kBf16}) {
-    for (const CpuIsa isa : supported_isas(element))
-      for (const int64_t head_dim : {40, 80, 160})
-        cases.push_back({isa, element, 2, head_dim, &four_views, isa == CpuIsa::kGeneric ? 2 : 5});
-    cases.push_back({supported_isas(element).back(), element, 1, 40, &nine_views, 2});
-  }
-
-  std::printf("%-12s %-5s %6s %4s %9s %9s %6s %9s %7s\n", "kernel", "type", "tokens", "dim", "GFLOP/s",
-              "peak", "share", "biased", "ratio");
-  nlohmann::json rows = nlohmann::json::array();
-  for (const Case& c : cases) {
-    const double tokens = static_cast<double>(c.buckets->num_pixels());
-    const double operations = 4 * tokens * tokens * static_cast<double>(c.head_dim * c.heads) * 1e-9;
-    const double peak = bench::matrix_peak_gflops(c.isa);
-    const double dense = measure(c, 0), biased = measure(c, 1.8f);
-    std::printf("%-12s %-5s %6.0f %4d %9.1f %9.1f %6.3f %9.1f %7.3f\n", name_of(c.isa),
-                c.element == Element::kF32 ? "f32" : "bf16", tokens, static_cast<int>(c.head_dim),
-                operations / dense, peak, operations / dense / peak, operations / biased, biased / dense);
+  set_num_threads(threads);
+  std::printf("%6s %4s %5s %9s %9s %7s  LibTorch's fastest\n", "tokens", "dim", "heads", "ours s", "LibTorch",
+              "ratio");
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& [tokens, head_dim, heads] :
+       {std::array<int64_t, 3>{4096, 40, 8}, {4096, 80, 8}, {4096, 160, 8}, {36864, 40, 1}}) {
+    Tensors tensors(heads, tokens, head_dim);
+    const double ours = wall_seconds(tensors, 5);
+    const bench::PeerAttention peer =
+        bench::libtorch_attention(tensors.bf16[0], tensors.bf16[1], tensors.bf16[2], tensors.bf16[3], heads,
+                                  tokens, head_dim, threads, 3);
+    std::printf("%6lld %4lld %5lld %9.4f %9.4f %7.2f  %s; outputs differ by %.1g\n",
+                static_cast<long long>(tokens), static_cast<long long>(head_dim),
+                static_cast<long long>(heads), ours, peer.seconds, peer.seconds / ours, peer.way.c_str(),
+                peer.worst_difference);
     std::fflush(stdout);
-    rows.push_back({{"isa", name_of(c.isa)},
-                    {"element", c.element == Element::kF32 ? "f32" : "bf16"},
-                    {"tokens", c.buckets->num_pixels()},
-                    {"heads", c.heads},
-                    {"head_dim", c.head_dim},
-                    {"biased_share", biased_share(*c.buckets)},
-                    {"dense_seconds", dense},
-                    {"biased_seconds", biased},
-                    {"dense_gflops", operations / dense},
-                    {"biased_gflops", operations / biased},
-                    {"peak_gflops", peak},
-                    {"share_of_peak", operations / dense / peak},
-                    {"biased_over_dense", biased / dense}});
+    smallest = std::min(smallest, peer.seconds / ours);
+    json["libtorch"].push_back({{"tokens", tokens},
+                                {"head_dim", head_dim},
+                                {"heads", heads},
+                                {"ours_seconds", ours},
+                                {"libtorch_seconds", peer.seconds},
+                                {"libtorch_way", peer.way},
+                                {"outputs_differ_by", peer.worst_difference},
+                                {"speedup", peer.seconds / ours}});
   }
-  write_file(
-      report,
-      nlohmann::json{{"unit", "GFLOP/s of one core by CPU time, 4 * queries * keys * head_dim operations"},
-                     {"cases", rows}}
-          .dump(1));
+  json["speedup_over_libtorch"] = smallest;
+  json["libtorch_version"] = bench::libtorch_version();
+  json["threads"] = threads;
+  json["asset"] = asset.filename().string();
+  write_file(report, json.dump(1));
   std::printf("wrote %s\n", report.c_str());
 }

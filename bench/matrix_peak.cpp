@@ -1,8 +1,12 @@
 #include "matrix_peak.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <ctime>
+
+#include "patina/base/random.h"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -81,14 +85,15 @@ __attribute__((target("avx512f,avx512bf16"))) void dot_512() {
     }
 }
 
+/// The operand of LDTILECFG; a constant, since GCC 12 drops stores to a local that only LDTILECFG reads.
+constexpr struct alignas(64) {
+  uint8_t palette = 1, start_row = 0, reserved[14] = {};
+  uint16_t row_bytes[16] = {64, 64, 64, 64, 64, 64, 64, 64};
+  uint8_t rows[16] = {16, 16, 16, 16, 16, 16, 16, 16};
+} kTileConfig;
+
 __attribute__((target("amx-tile,amx-bf16"))) void tile_dot() {
-  static constexpr struct alignas(
-      64) {  // a constant, since GCC 12 drops stores to a local that only LDTILECFG reads
-    uint8_t palette = 1, start_row = 0, reserved[14] = {};
-    uint16_t row_bytes[16] = {64, 64, 64, 64, 64, 64, 64, 64};
-    uint8_t rows[16] = {16, 16, 16, 16, 16, 16, 16, 16};
-  } config;
-  _tile_loadconfig(&config);
+  _tile_loadconfig(&kTileConfig);
   _tile_zero(0);
   _tile_zero(1);
   _tile_zero(2);
@@ -105,9 +110,41 @@ __attribute__((target("amx-tile,amx-bf16"))) void tile_dot() {
   }
   _tile_release();
 }
+
+/// tiles: 16 KiB.
+__attribute__((target("amx-tile,amx-bf16"))) void tile_dot_loaded(const char* tiles) {
+  _tile_loadconfig(&kTileConfig);
+  for (int i = 0; i < kRounds / 16; ++i) {
+    const char* at = tiles + i % 4 * 4096;
+    _tile_loadd(4, at, 64);
+    _tile_loadd(6, at + 1024, 64);
+    _tile_dpbf16ps(0, 4, 6);
+    _tile_loadd(7, at + 2048, 64);
+    _tile_dpbf16ps(1, 4, 7);
+    _tile_loadd(5, at + 3072, 64);
+    _tile_dpbf16ps(2, 5, 6);
+    _tile_dpbf16ps(3, 5, 7);
+  }
+  _tile_release();
+}
 #endif
 
 }  // namespace
+
+double loaded_tile_gflops() {
+#if defined(__x86_64__)
+  alignas(64) static uint16_t tiles[8192];
+  for (size_t i = 0; i < 8192; i += 4) {
+    const std::array<float, 4> values = gaussian4(2, RandomPurpose::kTest, i, 0);
+    for (size_t e = 0; e < 4; ++e)
+      tiles[i + e] = static_cast<uint16_t>(std::bit_cast<uint32_t>(values[e]) >> 16);
+  }
+  return best_gflops(kRounds / 16 * 4 * 2.0 * 16 * 16 * 32,
+                     [] { tile_dot_loaded(reinterpret_cast<const char*>(tiles)); });
+#else
+  return 0;
+#endif
+}
 
 double thread_seconds() {
   return seconds(CLOCK_THREAD_CPUTIME_ID);

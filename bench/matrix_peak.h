@@ -10,6 +10,11 @@ namespace patina::bench {
 /// (attention::supported_isas).
 double matrix_peak_gflops(attention::CpuIsa isa);
 
+/// The same for TDPBF16PS on Gaussian operands that come from the first cache, as a blocked product's do:
+/// each tile loaded feeds two products. Numbers that change cost power, and the clock sinks. Best of several
+/// runs.
+double loaded_tile_gflops();
+
 /// CPU seconds of the calling thread, and of all threads of the process.
 double thread_seconds();
 double process_seconds();

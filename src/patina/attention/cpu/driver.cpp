@@ -110,25 +110,31 @@ bool pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& si
   for (int64_t j = begin; j < padded_end; ++j) {
     const int64_t copied = j < end ? dim : 0;
     const uint16_t* row = k_in + (j < end ? j * a.k_strides.token : 0);
-    if (tiles) {
-      uint16_t* tile = k + j / 16 * 16 * sizes.dim + j % 16 * 32;
-      for (int64_t d = 0; d < sizes.dim; ++d) tile[d / 32 * 512 + d % 32] = d < copied ? row[d] : uint16_t{0};
-      moderate = moderate && all_moderate(row, copied);
-    } else {
-      std::memcpy(k + j * sizes.dim, row, static_cast<size_t>(copied) * 2);
-      std::fill(k + j * sizes.dim + copied, k + (j + 1) * sizes.dim, uint16_t{0});
+    uint16_t* to = tiles ? k + j / 16 * 16 * sizes.dim + j % 16 * 32 : k + j * sizes.dim;
+    const int64_t run = tiles ? 32 : sizes.dim, run_stride = tiles ? 512 : 0;
+    for (int64_t d = 0; d < sizes.dim; d += run, to += run_stride) {
+      const int64_t count = std::clamp<int64_t>(copied - d, 0, run);
+      std::memcpy(to, row + (count > 0 ? d : 0), static_cast<size_t>(count) * 2);
+      std::memset(to + count, 0, static_cast<size_t>(run - count) * 2);
     }
+    if (tiles && copied > 0)
+      moderate = moderate && all_moderate(row, dim) && all_moderate(v_in + j * a.v_strides.token, dim);
   }
-  for (int64_t j = begin; j < padded_end; ++j) {
-    const uint16_t* row = j < end ? v_in + j * a.v_strides.token : nullptr;
-    if (tiles) {
-      uint16_t* tile = v + j / 32 * value_dim * 32 + j % 32;
-      for (int64_t d = 0; d < value_dim; ++d) tile[32 * d] = row && d < dim ? row[d] : uint16_t{0};
-      if (row) {
-        tile[32 * dim] = bf16_of_float(1.0f);
-        moderate = moderate && all_moderate(row, dim);
-      }
-    } else {
+  if (tiles) {
+    for (int64_t j0 = begin; j0 < padded_end; j0 += 32) {
+      uint16_t* to = v + j0 * value_dim;  // [value_dim][32 keys]
+      const int64_t count = std::clamp<int64_t>(end - j0, 0, 32);
+      if (count < 32) std::memset(to, 0, static_cast<size_t>(value_dim) * 64);
+      const uint16_t* rows = v_in + j0 * a.v_strides.token;
+      for (int64_t d = 0; d < dim; ++d)
+        for (int64_t j = 0; j < count; ++j) to[d * 32 + j] = rows[j * a.v_strides.token + d];
+      std::fill(to + dim * 32, to + dim * 32 + count, bf16_of_float(1.0f));
+      std::fill(to + dim * 32 + count, to + dim * 32 + 32, uint16_t{0});
+      std::memset(to + (dim + 1) * 32, 0, static_cast<size_t>(value_dim - dim - 1) * 64);
+    }
+  } else {
+    for (int64_t j = begin; j < padded_end; ++j) {
+      const uint16_t* row = j < end ? v_in + j * a.v_strides.token : nullptr;
       uint16_t* pair = v + (j / 2 * dim) * 2 + j % 2;
       for (int64_t d = 0; d < dim; ++d) pair[2 * d] = row ? row[d] : uint16_t{0};
     }
@@ -160,23 +166,28 @@ uint64_t pack_queries(const Arguments& a, Packing packing, const PackedSizes& si
       for (int64_t d = 0; d < dim; ++d) q[d / 2 * 2 * kBlockQueries + d % 2] = row[d];
     } else {
       uint16_t* q = static_cast<uint16_t*>(q_out) + lane / 16 * 16 * sizes.dim + lane % 16 * 2;
-      for (int64_t d = 0; d < dim; ++d) q[d / 2 * 32 + d % 2] = row[d];
+      for (int64_t d = 0; d + 2 <= dim; d += 2) std::memcpy(q + d * 16, row + d, 4);
+      if (dim % 2) q[dim / 2 * 32] = row[dim - 1];
       if (!all_moderate(row, dim)) immoderate |= uint64_t{1} << lane;
     }
   }
   return immoderate;
 }
 
-void write_rows(const Arguments& a, int64_t out_base, const QueryBlock& block, const float* rows) {
+/// rows: [head_dim][64] f32; bf16: room for as many, where the element is that.
+void write_rows(const Arguments& a, int64_t out_base, const QueryBlock& block, const float* rows,
+                uint16_t* bf16) {
+  const int64_t dim = a.shape.head_dim;
+  if (a.element == Element::kBf16)
+    for (int64_t i = 0; i < dim * kBlockQueries; ++i) bf16[i] = bf16_of_float(rows[i]);
   for (int lane = 0; lane < block.num_lanes(); ++lane) {
     const int64_t offset = out_base + block.query(lane) * a.out_strides.token;
-    for (int64_t d = 0; d < a.shape.head_dim; ++d) {
-      const float value = rows[d * kBlockQueries + lane];
-      if (a.element == Element::kF32)
-        static_cast<float*>(a.out)[offset + d] = value;
-      else
-        static_cast<uint16_t*>(a.out)[offset + d] = bf16_of_float(value);
-    }
+    if (a.element == Element::kF32)
+      for (int64_t d = 0; d < dim; ++d)
+        static_cast<float*>(a.out)[offset + d] = rows[d * kBlockQueries + lane];
+    else
+      for (int64_t d = 0; d < dim; ++d)
+        static_cast<uint16_t*>(a.out)[offset + d] = bf16[d * kBlockQueries + lane];
   }
 }
 
@@ -248,6 +259,7 @@ void run_blocks(const Arguments& a, const Kernel& kernel) {
       block.score_scale = kernel.packing == Packing::kF32 ? 1.0f : scale;
       block.beta = beta;
 
+      std::vector<uint16_t> rounded(static_cast<size_t>(out_floats));
       std::vector<std::vector<BiasedKey>> biased(static_cast<size_t>(run), {no_bias});
       std::vector<uint64_t> immoderate(static_cast<size_t>(run));
       int64_t listed_run =
@@ -279,7 +291,7 @@ void run_blocks(const Arguments& a, const Kernel& kernel) {
             block.state = reinterpret_cast<float*>(states.get() + i * state_bytes);
             kernel.attend(block);
             if (block.end_key < n.num_keys) continue;
-            write_rows(a, base(a.out_strides, head), queries_of, block.out);
+            write_rows(a, base(a.out_strides, head), queries_of, block.out, rounded.data());
             if (a.log_sum_exp)
               for (int lane = 0; lane < block.num_lanes; ++lane)
                 a.log_sum_exp[head * n.num_queries + queries_of.query(lane)] = block.log_sum_exp[lane];
