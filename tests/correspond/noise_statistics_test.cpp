@@ -87,7 +87,25 @@ TEST(NoiseStatistics, views_are_told_apart) {
   for (const size_t other : {0u, 1u, 3u}) EXPECT_NEAR(all[other].mean, 0.0f, 0.04f);
 }
 
-TEST(NoiseStatistics, rejects_fields_that_cannot_be_cut) {
+TEST(NoiseStatistics, a_mask_leaves_out_pixels_and_their_neighbourhoods) {
+  // View 0: columns repeat in the right half, which the mask leaves out; view 3 is left out wholly.
+  const NoiseField noise = field_of(2, [](size_t i) { return white(i % 128 < 32 ? i : i / 2 * 2); });
+  std::vector<uint8_t> mask(128 * 128);
+  for (size_t i = 0; i < mask.size(); ++i) {
+    const size_t x = i % 128, y = i / 128;
+    mask[i] = y < 64 && x < 64 ? x < 32 : x < 64 || y < 64;
+  }
+  const auto all = noise_statistics(noise, 2, mask);
+  EXPECT_EQ(all[0].num_values, 4 * 32 * 64);
+  EXPECT_NEAR(all[0].autocorrelation_x, 0.0f, 0.045f);
+  EXPECT_NEAR(all[1].autocorrelation_x, 0.5f, 0.045f);
+  EXPECT_EQ(all[3].num_values, 0);
+  EXPECT_EQ(all[3].variance, 0.0f);
+  EXPECT_EQ(noise_statistics(noise, 2)[0].num_values, 4 * 64 * 64);
+}
+
+TEST(NoiseStatistics, rejects_fields_that_cannot_be_cut_and_masks_of_other_sizes) {
+  EXPECT_THROW(noise_statistics(field_of(1, white), 1, std::vector<uint8_t>(100, 1)), Error);
   EXPECT_THROW(noise_statistics(field_of(1, white), 3), Error);
   EXPECT_THROW(noise_statistics(NoiseField{}, 1), Error);
 }

@@ -204,6 +204,17 @@ TEST(Noise, repeats_bit_for_bit_with_any_number_of_threads) {
   }
 }
 
+TEST(Noise, several_seeds_at_once_are_those_one_by_one) {
+  const World world = sphere_world(UvState::kClean, 16);
+  const auto cameras = cameras_at({0, 90, 180, 270}, 64);
+  for (const NoiseMode mode : {NoiseMode::kIndependent, NoiseMode::kPaper, NoiseMode::kExact}) {
+    const auto both = make_noises(*world.scene, cameras, 8, {.mode = mode}, std::array<uint64_t, 2>{7, 3});
+    ASSERT_EQ(both.size(), 2u);
+    EXPECT_EQ(both[0].values, make_noise(*world.scene, cameras, 8, {.mode = mode, .seed = 7}).values);
+    EXPECT_EQ(both[1].values, make_noise(*world.scene, cameras, 8, {.mode = mode, .seed = 3}).values);
+  }
+}
+
 TEST(Noise, sizes_follow_the_views) {
   const World world = sphere_world(UvState::kClean, 8);
   std::vector<render::Camera> cameras(9, render::look_at(vec3(0, 0, 5), vec3(0.0f), 0.5f, 72, 40));
@@ -214,7 +225,7 @@ TEST(Noise, sizes_follow_the_views) {
   for (const float value : noise.values) EXPECT_TRUE(std::isfinite(value));
 }
 
-TEST(Noise, rejects_sizes_that_do_not_fit) {
+TEST(Noise, rejects_sizes_and_options_that_do_not_fit) {
   const World world = sphere_world(UvState::kClean, 8);
   const render::Camera odd = render::look_at(vec3(0, 0, 5), vec3(0.0f), 0.5f, 100, 96);
   const render::Camera even = render::look_at(vec3(0, 0, 5), vec3(0.0f), 0.5f, 96, 96);
@@ -223,6 +234,12 @@ TEST(Noise, rejects_sizes_that_do_not_fit) {
   EXPECT_THROW(make_noise(*world.scene, std::vector{even, even, even, odd}, 4, {}), Error);
   EXPECT_THROW(make_noise(*world.scene, std::vector{even}, 0, {}), Error);
   EXPECT_THROW(make_noise(*world.scene, std::vector{even}, 8, {NoiseMode::kPaper, 0, 0}), Error);
+  for (const int subpixels : {0, 65})
+    EXPECT_THROW(
+        make_noise(*world.scene, std::vector{even}, 8, {.mode = NoiseMode::kPaper, .subpixels = subpixels}),
+        Error);
+  for (const float points : {0.0f, -1.0f, std::numeric_limits<float>::infinity()})
+    EXPECT_THROW(make_noise(*world.scene, std::vector{even}, 8, {.points_per_latent = points}), Error);
 }
 
 TEST(Noise, reports_progress_and_stops_when_asked) {
