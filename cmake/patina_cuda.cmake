@@ -29,6 +29,16 @@ foreach(name torch c10 c10_cuda)
   endforeach()
 endforeach()
 
+# pip's LibTorch brings NCCL, cuBLAS and the like in folders beside it, and its libraries find them there when they are
+# loaded. The linker must look there too, before a toolkit's folder that may hold older ones.
+file(GLOB patina_torch_needs LIST_DIRECTORIES true "${PATINA_TORCH_PREFIX}/../nvidia/*/lib")
+foreach(folder ${patina_torch_needs})
+  add_link_options("LINKER:-rpath-link,${folder}")
+endforeach()
+
+# One CUDA runtime in the process: the one that LibTorch loads.
+set(CMAKE_CUDA_RUNTIME_LIBRARY Shared)
+
 if(PATINA_CCACHE)
   set(CMAKE_CUDA_COMPILER_LAUNCHER "${PATINA_CCACHE}")
 endif()

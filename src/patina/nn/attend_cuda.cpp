@@ -52,7 +52,8 @@ at::Tensor split_heads(const at::Tensor& x, int64_t num_heads) {
 template <class T>
 at::Tensor upload(const std::vector<T>& values, at::ScalarType dtype, at::Device device) {
   const int64_t size = static_cast<int64_t>(values.size() * sizeof(T) / c10::elementSize(dtype));
-  return at::from_blob(const_cast<T*>(values.data()), {size}, at::TensorOptions(dtype)).to(device);
+  return at::from_blob(const_cast<T*>(values.data()), {size}, at::TensorOptions(dtype))
+      .to(device, dtype, /*non_blocking=*/false, /*copy=*/true);
 }
 
 attention::Strides strides_of(const at::Tensor& x) {
