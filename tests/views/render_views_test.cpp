@@ -34,23 +34,37 @@ class RenderViews : public testing::Test {
   asset::Asset asset_;
 };
 
-TEST_F(RenderViews, exposure_lays_the_log_average_onto_middle_grey) {
-  // A white furnace shows radiance 1 on every pixel of an object with albedo 1; here the object reflects
-  // half.
-  const ViewSet views = render_views(scene(3.0f), cameras(), quick(), {});
-  EXPECT_EQ(views.grid, 2);
-  ASSERT_EQ(views.views.size(), 4u);
-  double sum = 0;
-  int count = 0;
-  for (const View& view : views.views)
-    for (size_t i = 0; i < view.gbuffer.coverage.size(); ++i)
-      if (view.gbuffer.coverage[i] == 1.0f) {
-        const float* rgb = &view.radiance.pixels[3 * i];
-        sum += std::log(luminance(vec3(rgb[0], rgb[1], rgb[2])));
-        ++count;
-      }
-  const auto log_average = static_cast<float>(std::exp(sum / count));
-  EXPECT_NEAR(reinhard(std::exp2(views.exposure_ev) * log_average), 0.18f, 0.002f);
+TEST_F(RenderViews, exposure_lays_a_grey_card_onto_middle_grey) {
+  // Under even light an object sends back its reflectance of it: one of 0.18 lands at 0.18, whatever the
+  // light.
+  for (const float base : {0.0625f, 0.18f, 0.8f}) {
+    std::vector<scenes::Part> parts = parts_;
+    std::vector<asset::MaterialMaps> maps = scenes::make_maps(parts);
+    for (asset::MaterialMaps& map : maps)
+      std::fill(map.base_color.texels.pixels.begin(), map.base_color.texels.pixels.end(), base);
+    const render::Scene lit(asset_, std::move(maps), render::constant_environment(vec3(3.0f)));
+    ViewOptions options = quick();
+    options.path.samples_per_pixel = 64;  // noise lowers the mean of logarithms
+    const ViewSet views = render_views(lit, cameras(), options, {});
+    EXPECT_EQ(views.grid, 2);
+    ASSERT_EQ(views.views.size(), 4u);
+    const float reflectance = 0.025f + 0.975f * base;
+    double sum = 0;
+    int count = 0;
+    for (const View& view : views.views)
+      for (size_t i = 0; i < view.gbuffer.coverage.size(); ++i)
+        if (view.gbuffer.coverage[i] == 1.0f) {
+          EXPECT_NEAR(view.gbuffer.reflectance[i], reflectance, 1e-5f);
+          const float* rgb = &view.radiance.pixels[3 * i];
+          sum += std::log(luminance(vec3(rgb[0], rgb[1], rgb[2])));
+          ++count;
+        }
+    const auto log_average = static_cast<float>(std::exp(sum / count));
+    const float card = std::exp2(views.exposure_ev) * log_average * 0.18f / reflectance;
+    EXPECT_NEAR(reinhard(card), 0.18f, 0.002f);
+    // A matt object in even light is as bright as its reflectance says, about.
+    EXPECT_NEAR(log_average / 3.0f / reflectance, 1.0f, 0.15f) << base;
+  }
 }
 
 TEST_F(RenderViews, exposure_follows_the_unit_of_light) {

@@ -29,7 +29,15 @@ GBuffer empty_gbuffer(int width, int height) {
   out.view_cosine.assign(count, 0.0f);
   out.depth.assign(count, std::numeric_limits<float>::infinity());
   out.coverage.assign(count, 0.0f);
+  out.reflectance.assign(count, 0.0f);
   return out;
+}
+
+// The base colour, and a dielectric's gloss, between rough and smooth: so a black object does not seem to stand in the dark.
+float reflectance_of(const render::BsdfParams& bsdf) {
+  constexpr float kGloss = 0.025f;
+  const float base = luminance(bsdf.base_color);
+  return std::max(bsdf.metallic * base + (1.0f - bsdf.metallic) * ((1.0f - kGloss) * base + kGloss), kGloss);
 }
 
 void trace_centers(const render::Scene& scene, const render::Camera& camera, GBuffer& out) {
@@ -52,6 +60,7 @@ void trace_centers(const render::Scene& scene, const render::Camera& camera, GBu
         out.n_geometric_world[i] = point.n_geometric;
         out.view_cosine[i] = glm::clamp(-glm::dot(point.n_geometric, ray.direction), 0.0f, 1.0f);
         out.depth[i] = glm::dot(point.p_world - eye, forward);
+        out.reflectance[i] = reflectance_of(point.bsdf);
       }
     }
   });

@@ -28,6 +28,7 @@ struct GBuffer {
   std::vector<float> view_cosine;  // of the angle between the geometric normal and the direction to the eye
   std::vector<float> depth;        // metres along the viewing axis, infinity where nothing was hit
   std::vector<float> coverage;     // share of the pixel that enhanced surface covers, 4 × 4 rays, [0,1]
+  std::vector<float> reflectance;  // share of white light from all around that comes back, roughly, [0.025,1]
 };
 
 struct View {
@@ -62,8 +63,7 @@ GBuffer make_gbuffer(const render::Scene& scene, const render::Camera& camera);
 
 struct ViewOptions {
   render::PathOptions path;
-  std::optional<float>
-      exposure_ev;  // nullopt: chosen so that the object's log-average luminance lands at middle grey
+  std::optional<float> exposure_ev;  // nullopt: choose_exposure
 };
 
 /// Renders every camera and fills G-buffers; cameras.size() must be a square number. Camera rays never show
@@ -78,11 +78,12 @@ ViewSet render_views(const render::Scene& scene, std::span<const render::Camera>
 float seen_share(const render::Scene& scene, std::span<const render::Camera> cameras, int min_views = 1,
                  int material = -1);
 
-/// The exposure in EV at which the log-average luminance of the pixels that the asset fills lands at middle
-/// grey:
-///   reinhard(2^EV · L) = kMiddleGrey,  L = exp(mean(log(Y + 0.001 · mean(Y)))),  Y the luminance of a pixel
-///   of any view.
-/// 0 where no pixel is filled or the asset is black.
+/// The exposure in EV that a meter for incident light would give: a grey card in the object's place would
+/// land at middle grey, so that white objects come out white and black ones black.
+///   reinhard(2^EV · L) = kMiddleGrey,  L = kMiddleGrey · exp(mean(log(E + 0.001 · mean(E)))),  E = Y /
+///   reflectance,
+/// Y the luminance of a pixel that the asset fills, of any view. 0 where there is none or the asset sends no
+/// light.
 inline constexpr double kMiddleGrey = 0.18;  // linear; sRGB 0.46
 float choose_exposure(std::span<const View> views);
 
