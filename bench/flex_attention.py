@@ -1,5 +1,5 @@
 """The peer of bench_attention_cuda.py: the same bias through PyTorch's FlexAttention, as the paper computes it
-[Hadadan2025, Sec. 5]: every score is looked at, and beta is added where the key's surface point lands in the
+[Hadadan2025, Sec. 5; Dong2024]: every score is looked at, and beta is added where the key's surface point lands in the
 query's window. It needs no N x N memory either, but the test runs N^2 times a head.
 
 The correspondences are those of views of a cylinder at equal steps of azimuth, as in bench_attention.cpp: the

@@ -1,6 +1,6 @@
 // Runs the CUDA kernel of sparse_merge on the CPU: every thread of a block is a fiber that executes
 // merge_block itself, and the instructions that only a GPU has are done for a whole warp once its 32 threads
-// have come to them, by the operand layouts of [PTX, Secs. 9.7.14, 9.7.15]. What a GPU would leave to chance
+// have come to them, by the operand layouts of [PTX, Matrix Fragments]. What a GPU would leave to chance
 // is chosen by Schedule, so that a missing barrier or wait shows.
 #pragma once
 

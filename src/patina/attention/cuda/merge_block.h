@@ -6,7 +6,7 @@
 // 1, output O. The kernel lets it see the biased keys once more, with weight (e^β − 1) e^s. So a row needs no
 // maximum of its own, terms are at most about e^β − 1, and what overflow is left to guard against happens for
 // large β alone. A block is 64 queries of one head, four warps of 16; it gathers tiles of 32 biased keys and
-// values, double-buffered or better, and works as [Dao2023] does within a warp: scores and weights stay in
+// values, double-buffered or better, and works as [Dao2024] does within a warp: scores and weights stay in
 // registers, whose layout as the result of one product is that of an operand of the next.
 #pragma once
 
