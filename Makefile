@@ -2,6 +2,7 @@
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
+#   make bench-noise, make bench-attention   measure, print tables, write build/bench/*.json (docs/performance.md)
 
 JOBS ?= $(shell nproc)
 DEMO_DIR := build/demo
@@ -41,6 +42,15 @@ bench-noise: setup
 	@cmake --preset release -DPATINA_BUILD_BENCH=ON
 	@cmake --build build/release --parallel $(JOBS) --target bench_noise
 	build/release/bench_noise --out build/bench/noise.json
+
+bench-noise: bench-programs
+	build/release/bench_noise build/bench/noise.json
+
+# On the GPU too where there is one, with a Python whose torch sees it.
+bench-attention: bench-programs
+	OMP_WAIT_POLICY=passive build/release/bench_attention build/bench/attention.json
+	@if nvidia-smi > /dev/null 2>&1; then python3 bench/bench_attention_cuda.py --report build/bench/attention.json; \
+	else echo "No GPU here; where there is one:  python3 bench/bench_attention_cuda.py"; fi
 
 format:
 	git ls-files '*.cpp' '*.h' | xargs clang-format -i
