@@ -7,6 +7,7 @@
 
 #include <ATen/ATen.h>
 #include <ATen/Parallel.h>
+#include <c10/core/GradMode.h>
 #include <torch/version.h>
 
 namespace patina::bench {
@@ -48,7 +49,7 @@ at::Tensor blocks(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v,
 PeerAttention libtorch_attention(std::span<const uint16_t> q_values, std::span<const uint16_t> k_values,
                                  std::span<const uint16_t> v_values, std::span<const uint16_t> ours,
                                  int64_t heads, int64_t tokens, int64_t head_dim, int threads, int runs) {
-  const at::NoGradGuard no_grad;
+  const c10::NoGradGuard no_grad;
   at::set_num_threads(threads);
   const at::Tensor q = tensor_of(q_values, heads, tokens, head_dim),
                    k = tensor_of(k_values, heads, tokens, head_dim),
@@ -81,7 +82,7 @@ PeerAttention libtorch_attention(std::span<const uint16_t> q_values, std::span<c
 }
 
 double libtorch_matmul_gflops(int64_t size, int threads) {
-  const at::NoGradGuard no_grad;
+  const c10::NoGradGuard no_grad;
   at::set_num_threads(threads);
   const at::Tensor a = at::randn({size, size}).to(at::kBFloat16),
                    b = at::randn({size, size}).to(at::kBFloat16);

@@ -39,6 +39,9 @@ endif()
 
 add_library(patina_options INTERFACE)
 target_include_directories(patina_options INTERFACE "${CMAKE_SOURCE_DIR}/src")
+if(PATINA_CUDA)
+  target_include_directories(patina_options SYSTEM BEFORE INTERFACE "${CMAKE_BINARY_DIR}/include_first")
+endif()
 # GCC 12 sees overflows and overlaps in std::vector and std::string that are not there (its bugs 105329, 105651).
 set(options -Wno-stringop-overflow -Wno-restrict
   -march=${PATINA_ARCH} -Wall -Wextra -Wpedantic -Wshadow $<$<BOOL:${PATINA_WERROR}>:-Werror>)

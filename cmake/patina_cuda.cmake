@@ -29,12 +29,20 @@ foreach(name torch c10 c10_cuda)
   endforeach()
 endforeach()
 
-# pip's LibTorch brings NCCL, cuBLAS and the like in folders beside it, and its libraries find them there when they are
-# loaded. The linker must look there too, before a toolkit's folder that may hold older ones.
+# pip's LibTorch brings the CUDA runtime, NCCL, cuBLAS and the like in folders beside it. Linker and loader must look there
+# first: a toolkit's folder may hold older ones.
 file(GLOB patina_torch_needs LIST_DIRECTORIES true "${PATINA_TORCH_PREFIX}/../nvidia/*/lib")
 foreach(folder ${patina_torch_needs})
+  file(REAL_PATH "${folder}" folder)
   add_link_options("LINKER:-rpath-link,${folder}")
+  list(APPEND CMAKE_BUILD_RPATH "${folder}")
 endforeach()
+
+# LibTorch 2.x brings headers of its own fmt, which would be compiled against and not linked: patina_options puts this
+# folder first (patina.cmake).
+find_path(PATINA_FMT_INCLUDE fmt/format.h PATHS /usr/include REQUIRED NO_CMAKE_PATH)
+file(MAKE_DIRECTORY "${CMAKE_BINARY_DIR}/include_first")
+file(CREATE_LINK "${PATINA_FMT_INCLUDE}/fmt" "${CMAKE_BINARY_DIR}/include_first/fmt" SYMBOLIC)
 
 # One CUDA runtime in the process: the one that LibTorch loads.
 set(CMAKE_CUDA_RUNTIME_LIBRARY Shared)
