@@ -66,6 +66,7 @@ void Whiteness::add(const Whiteness& other) {
   max_autocorrelation = std::max(max_autocorrelation, other.max_autocorrelation);
   smallest_ks_p = std::min(smallest_ks_p, other.smallest_ks_p);
   ks_tests += other.ks_tests;
+  ks_below_1_percent += other.ks_below_1_percent;
 }
 
 Whiteness measure_whiteness(const std::vector<correspond::NoiseField>& noises, int grid,
@@ -89,7 +90,9 @@ Whiteness measure_whiteness(const std::vector<correspond::NoiseField>& noises, i
     const auto whole = correspond::noise_statistics(noise, grid);
     for (size_t view = 0; view < num_views; ++view) {
       sums[view].add(whole[view]);
-      out.smallest_ks_p = std::min(out.smallest_ks_p, static_cast<double>(whole[view].kolmogorov_smirnov_p));
+      const auto p = static_cast<double>(whole[view].kolmogorov_smirnov_p);
+      out.smallest_ks_p = std::min(out.smallest_ks_p, p);
+      out.ks_below_1_percent += p < 0.01;
       ++out.ks_tests;
     }
     for (const auto& s : correspond::noise_statistics(noise, grid, surface)) sums[num_views].add(s);

@@ -34,8 +34,9 @@ struct Range {
 struct Whiteness {
   Range mean, variance;
   double max_autocorrelation = 0;
-  double smallest_ks_p = 1;  // of one view and seed, with its background
-  int64_t ks_tests = 0;
+  // Kolmogorov-Smirnov tests, one a view and seed, with the background.
+  double smallest_ks_p = 1;
+  int64_t ks_tests = 0, ks_below_1_percent = 0;
   void add(const Whiteness& other);
 };
 Whiteness measure_whiteness(const std::vector<correspond::NoiseField>& noises, int grid,

@@ -194,6 +194,25 @@ TEST_F(EditConsistency, pixels_count_by_the_surface_they_show) {
   }
 }
 
+TEST_F(EditConsistency, the_sides_of_a_sheet_are_compared_if_its_material_has_two) {
+  const auto sheet = scenes::quad(vec3(-4, -4, 0), vec3(8, 0, 0), vec3(0, 8, 0));
+  const render::Camera front = render::look_at(vec3(0, 0, 5), vec3(0.0f), 0.5f, 128, 128);
+  const render::Camera behind = render::look_at(vec3(0, 0, -5), vec3(0.0f), 0.5f, 128, 128);
+  const render::Camera away = render::look_at(vec3(0, 0, 5), vec3(0, 0, 10), 0.5f, 128, 128);
+  for (const bool double_sided : {false, true}) {
+    const World world = make_world({{sheet, {}}}, {}, double_sided);
+    const auto views = view_set(*world.scene, {front, behind, away, away});
+    const Pictures pictures = paint(views, [](size_t, size_t, const vec3& p) { return pattern(p); });
+    const Consistency c = edit_consistency(*world.scene, views, pictures.conditioning, pictures.edited);
+    if (double_sided) {
+      EXPECT_GT(c.covisible_pixels, 2 * 110 * 110);
+      EXPECT_GT(c.edit_correlation, 0.99f);
+    } else {
+      EXPECT_EQ(c.covisible_pixels, 0);
+    }
+  }
+}
+
 TEST_F(EditConsistency, a_tint_that_all_views_share_is_no_agreement_of_detail) {
   const Pictures pictures = paint(views_, [](size_t view, size_t pixel, const vec3&) {
     const auto g = gaussian4(view, RandomPurpose::kTest, pixel);

@@ -227,7 +227,7 @@ TEST(Correspondences, correspondence_is_mutual) {
   EXPECT_GT(returned, 0.95 * checked);
 }
 
-TEST(Correspondences, back_faces_are_excluded_but_not_of_double_sided_sheets_seen_from_one_side) {
+TEST(Correspondences, back_faces_are_excluded_but_both_sides_of_a_double_sided_sheet_correspond) {
   const auto sheet = scenes::quad(vec3(-4, -4, 0), vec3(8, 0, 0), vec3(0, 8, 0));
   const render::Camera behind = render::look_at(vec3(0, 0, -5), vec3(0.0f), 0.5f, 64, 64);
   const render::Camera beside = render::look_at(vec3(1, 0, -5), vec3(0.0f), 0.5f, 64, 64);
@@ -240,7 +240,11 @@ TEST(Correspondences, back_faces_are_excluded_but_not_of_double_sided_sheets_see
   const size_t n = num_pixels(of_single), j = pixel_index(of_single, 0, 4, 4);
   EXPECT_FALSE(seen(of_single.landing[n + j]));
   EXPECT_TRUE(seen(of_both.landing[n + j]));
-  EXPECT_FALSE(seen(of_both.landing[2 * n + j]));  // the other side is another surface
+  // Both sides wear one texture. Pixel (4, 4) from behind is (3, 4) from the front.
+  EXPECT_FALSE(seen(of_single.landing[2 * n + j]));
+  ASSERT_TRUE(seen(of_both.landing[2 * n + j]));
+  EXPECT_NEAR(of_both.landing[2 * n + j].x, 3.5f, 1e-3f);
+  EXPECT_NEAR(of_both.landing[2 * n + j].y, 4.5f, 1e-3f);
 }
 
 TEST(BiasLevels, sizes_and_windows_follow_the_unet) {

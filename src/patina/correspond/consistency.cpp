@@ -7,7 +7,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
-#include "patina/views/visibility.h"
+#include "patina/correspond/footprint.h"
 
 namespace patina::correspond {
 namespace {
@@ -157,13 +157,14 @@ Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& v
           const vec3 p_world = from.p_world[pixel];
           vec3 n_world = from.n_geometric_world[pixel];
           if (glm::dot(n_world, eye - p_world) < 0.0f) n_world = -n_world;
+          const auto primitive = static_cast<uint32_t>(from.primitive[pixel]);
           const vec3 edit = edit_at(a, pixel);
           const double area = surface_area(views.views[a], pixel);
           for (size_t b = 0; b < num_views; ++b) {
             if (b == a) continue;
             const views::View& target = views.views[b];
             const auto projection = target.camera.project(p_world);
-            if (!projection || !(glm::dot(n_world, target.camera.position() - p_world) > 0.0f)) continue;
+            if (!projection) continue;
             const auto taps = taps_at(projection->pixel, target.gbuffer.width, target.gbuffer.height);
             if (!taps) continue;
             // The G-buffer tells most hidden points from seen ones without a ray.
@@ -172,7 +173,7 @@ Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& v
               usable = usable && counted[b][tap] &&
                        std::abs(target.gbuffer.depth[tap] - projection->depth) <=
                            kMaxDepthStep * projection->depth;
-            if (!usable || !views::seen_at(scene, target.camera, p_world, n_world)) continue;
+            if (!usable || !seen_from(scene, target.camera, primitive, p_world, n_world)) continue;
             vec3 warped(0.0f);
             for (size_t tap = 0; tap < 4; ++tap) warped += taps->weight[tap] * edit_at(b, taps->pixel[tap]);
             rows[static_cast<size_t>(y) * num_views + b].add(edit, warped, area);

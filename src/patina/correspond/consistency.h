@@ -22,8 +22,8 @@ struct Consistency {
 };
 
 /// conditioning and edited: one sRGB [H,W,3] image a view. Pixels near the silhouette and at grazing angles
-/// (view cosine below 0.2) are left out. b's edit is read bilinearly, so detail finer than a pixel of b costs
-/// correlation even where views agree.
+/// (view cosine below 0.2) are left out. Of a double-sided sheet b may see the other side. b's edit is read
+/// bilinearly, so detail finer than a pixel of b costs correlation even where views agree.
 Consistency edit_consistency(const render::Scene& scene, const views::ViewSet& views,
                              std::span<const Image> conditioning, std::span<const Image> edited);
 

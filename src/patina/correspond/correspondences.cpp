@@ -8,8 +8,8 @@
 
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
+#include "patina/correspond/footprint.h"
 #include "patina/views/view_set.h"
-#include "patina/views/visibility.h"
 
 namespace patina::correspond {
 namespace {
@@ -62,7 +62,8 @@ Correspondences find_correspondences(const render::Scene& scene, std::span<const
         const size_t j = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
         for (size_t view = 0; view < cameras.size(); ++view) {
           if (view == own) continue;
-          const auto pixel = views::seen_at(scene, cameras[view], front->p_world, front->n_world);
+          const auto pixel =
+              seen_from(scene, cameras[view], front->hit.primitive, front->p_world, front->n_world);
           if (pixel) out.landing[view * num_pixels + j] = *pixel / scale;
         }
       }

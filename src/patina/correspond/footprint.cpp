@@ -14,6 +14,14 @@ float area_per_pixel(const render::Camera& camera, const render::Ray& ray, const
   return square(front.hit.t) * solid_angle / std::max(front.cosine, 0.001f);
 }
 
+std::optional<vec2> seen_from(const render::Scene& scene, const render::Camera& camera, uint32_t primitive,
+                              const vec3& p_world, vec3 n_world) {
+  const auto material = static_cast<size_t>(scene.primitives()[primitive]->material);
+  if (scene.materials()[material].double_sided && glm::dot(n_world, camera.position() - p_world) < 0.0f)
+    n_world = -n_world;
+  return views::seen_at(scene, camera, p_world, n_world);
+}
+
 Footprints trace_footprints(const render::Scene& scene, const render::Camera& camera, int latent_scale) {
   constexpr int kSide = 4;
   Footprints out;

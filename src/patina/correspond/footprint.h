@@ -1,7 +1,9 @@
-// What a latent pixel covers: how much of it shows enhanced surface, and how much surface that is.
+// What a latent pixel covers: how much of it shows enhanced surface, and how much surface that is; and
+// whether another view sees the same.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +15,11 @@ namespace patina::correspond {
 /// Surface area in m² that one square pixel sees through `ray` at `front`: t² dω / cos θ, with the solid
 /// angle of an off-axis pixel. Grazing hits count at most a thousand times their projected area.
 float area_per_pixel(const render::Camera& camera, const render::Ray& ray, const views::FrontHit& front);
+
+/// views::seen_at for a point of the asset's `primitive`, which has one front or, with a double-sided
+/// material, two: both sides wear one texture, so a view of either is a view of the same surface.
+std::optional<vec2> seen_from(const render::Scene& scene, const render::Camera& camera, uint32_t primitive,
+                              const vec3& p_world, vec3 n_world);
 
 /// Latent pixels of one view, [height, width] row by row, by 4 × 4 rays each.
 struct Footprints {

@@ -24,8 +24,9 @@ SurfaceSamples sample_surface(const render::Scene& scene, const render::Camera& 
                        static_cast<float>(pixel / out.width * side + sample / side) + 0.5f);
         const render::Ray ray = camera.ray(step * sub);
         if (const auto front = views::front_hit(scene, ray))
-          found[static_cast<size_t>(pixel)].push_back(
-              {front->p_world, front->n_world, square(step) * area_per_pixel(camera, ray, *front)});
+          found[static_cast<size_t>(pixel)].push_back({front->p_world, front->n_world,
+                                                       square(step) * area_per_pixel(camera, ray, *front),
+                                                       front->hit.primitive});
       }
     }
   });
@@ -52,7 +53,7 @@ std::vector<SharedPatch> shared_patches(const render::Scene& scene, const Surfac
       landed.clear();
       for (int64_t s = from.first[pixel]; s < from.first[pixel + 1]; ++s) {
         const SurfaceSamples::Sample& sample = from.samples[static_cast<size_t>(s)];
-        const auto at = views::seen_at(scene, to.camera, sample.p_world, sample.n_world);
+        const auto at = seen_from(scene, to.camera, sample.primitive, sample.p_world, sample.n_world);
         if (!at) continue;
         const int x = std::min(static_cast<int>(at->x / latent_scale), to.width - 1);
         const int y = std::min(static_cast<int>(at->y / latent_scale), to.height - 1);

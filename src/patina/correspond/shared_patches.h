@@ -15,6 +15,7 @@ struct SurfaceSamples {
     vec3 p_world;
     vec3 n_world;  // unit, geometric, toward the eye
     float area;    // m² of surface that the ray stands for
+    uint32_t primitive;
   };
   render::Camera camera;
   int width = 0, height = 0;       // latent pixels
