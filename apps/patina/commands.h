@@ -11,6 +11,8 @@ void add_render(CLI::App& program);
 void add_detail(CLI::App& program);
 void add_fit(CLI::App& program);
 void add_report(CLI::App& program);
+void add_ablate(CLI::App& program);
+void add_show_attention(CLI::App& program);
 void add_info(CLI::App& program);
 
 }  // namespace patina::app

@@ -37,7 +37,8 @@ int exit_code_of(patina::ErrorCode code) {
 int main(int argc, char** argv) {
   // Only these commands run networks; the others start twice as fast without it.
   const std::string_view command = argc > 1 ? argv[1] : "";
-  if (command == "enhance" || command == "detail") patina::nn::sleep_between_parallel_regions(argv);
+  if (command == "enhance" || command == "detail" || command == "ablate" || command == "show-attention")
+    patina::nn::sleep_between_parallel_regions(argv);
   CLI::App program(
       "patina adds generated detail (rust, moss, wear, dust, age) to the material of an existing 3D asset.\n"
       "Mesh, UVs and file structure stay; base colour, normal and roughness textures change.\n\n"
@@ -50,6 +51,8 @@ int main(int argc, char** argv) {
   patina::app::add_detail(program);
   patina::app::add_fit(program);
   patina::app::add_report(program);
+  patina::app::add_ablate(program);
+  patina::app::add_show_attention(program);
   patina::app::add_info(program);
 
   patina::app::install_stop_handler();

@@ -24,8 +24,14 @@ std::shared_ptr<GivenOptions> add_options(CLI::App& command, unsigned stages,
     const std::string help =
         option.default_text.empty() ? option.help : fmt::format("{} [{}]", option.help, option.default_text);
     // Values stay text here: the pipeline's list parses them, the same way wherever they come from.
-    CLI::Option* cli = command.add_option(names, help)->group(option.group)->type_name(option.placeholder);
-    cli->expected(1, option.is_list ? CLI::detail::expected_max_vector_size : 1);
+    CLI::Option* cli;
+    if (option.is_flag) {
+      cli = command.add_flag(names, help);
+    } else {
+      cli = command.add_option(names, help)->type_name(option.placeholder);
+      cli->expected(1, option.is_list ? CLI::detail::expected_max_vector_size : 1);
+    }
+    cli->group(option.group);
     if (!option.is_list) cli->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     given->options.emplace_back(option.name, cli);
   }
@@ -61,7 +67,7 @@ void apply_options(const GivenOptions& given, pipeline::Config& config) {
     }
   }
   for (const auto& [name, cli] : given.options)
-    if (cli->count() > 0) pipeline::find_option(name)->set(config, cli->results());
+    if (cli->count() > 0) pipeline::find_option(name)->set(config, cli->reduced_results());
 }
 
 }  // namespace patina::app

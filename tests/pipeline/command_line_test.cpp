@@ -45,7 +45,7 @@ TEST(CommandLine, help_explains_every_option) {
   EXPECT_EQ(result.exit_code, 0);
   for (const pipeline::Option& option : pipeline::options())
     EXPECT_NE(result.output.find("--" + option.name), std::string::npos) << option.name;
-  for (const char* command : {"render", "detail", "fit", "report", "info"})
+  for (const char* command : {"render", "detail", "fit", "report", "ablate", "show-attention", "info"})
     EXPECT_EQ(patina({command, "--help"}).exit_code, 0) << command;
   EXPECT_NE(patina({"--version"}).output.find("patina"), std::string::npos);
 }
@@ -58,6 +58,8 @@ TEST(CommandLine, wrong_usage_is_exit_code_2) {
   expect_refused(2, {kettle()}, {"--prompt"});
   expect_refused(2, {kettle(), "-p", "rust", "--views", "5"}, {"--views", "4, 9 or 16", "'5'"});
   expect_refused(2, {kettle(), "-p", "rust", "--strength", "1.5"}, {"--strength", "0.01 to 1"});
+  expect_refused(2, {kettle(), "-p", "rust", "--strength", "0.5", "--strength", "7"},
+                 {"'7'"});  // the last wins
   expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "100", "--bias", "0"},
                  {"--resolution", "multiple of 8"});
   expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--resolution", "72", "--bias", "1"},
@@ -104,6 +106,9 @@ TEST(CommandLine, a_config_file_holds_options_and_the_command_line_wins) {
   expect_refused(2, {kettle(), "--config", config.string()}, {"--views", "'5'"});
   write_file(config, std::string_view("prompt = \"moss\"\nstrength = 0.5\nelevation = [10, 30]\n"));
   expect_refused(2, {kettle(), "--config", config.string(), "--strength", "7"}, {"--strength", "'7'"});
+  write_file(config, std::string_view("prompt = \"moss\"\nbias-controlnet = 2\n"));
+  expect_refused(2, {kettle(), "--config", config.string()}, {"--bias-controlnet", "true or false"});
+  expect_refused(2, {kettle(), "-p", "moss", "--bias-controlnet"}, {"--model"});  // a flag needs no value
   write_file(config, std::string_view("colour = \"red\"\n"));
   expect_refused(2, {kettle(), "--config", config.string()}, {"colour", "config.toml"});
   write_file(config, std::string_view("[[[\n"));

@@ -48,6 +48,7 @@ TEST(Options, every_value_survives_a_round_trip_through_json) {
   set(config, "noise", {"paper"});
   set(config, "bias", {"1.8"});
   set(config, "bias-scaling", {"additive"});
+  set(config, "bias-controlnet", {"true"});
   set(config, "fit", {"base_color,metallic"});
   set(config, "material", {"lid", "body"});
   set(config, "seed", {"18446744073709551615"});
@@ -57,6 +58,7 @@ TEST(Options, every_value_survives_a_round_trip_through_json) {
   EXPECT_EQ(again.seed, 18446744073709551615u);
   EXPECT_TRUE(again.fit.fit_metallic);
   EXPECT_FALSE(again.fit.fit_roughness);
+  EXPECT_TRUE(again.detail.bias_controlnet);
 }
 
 TEST(Options, defaults_shown_are_the_defaults_used) {
@@ -87,6 +89,7 @@ TEST(Options, refuses_what_is_no_number_or_no_choice) {
                                                                                     {"scheduler", "magic"},
                                                                                     {"fit", "colour"},
                                                                                     {"exposure", "bright"},
+                                                                                    {"bias-controlnet", "1"},
                                                                                     {"seed", "-1"}}) {
     EXPECT_THROW(find_option(name)->set(config, std::vector<std::string>{value}), Error)
         << name << " " << value;

@@ -2,6 +2,9 @@
 // process owns it.
 #include "patina/pipeline/run_folder.h"
 
+#include <chrono>
+#include <thread>
+
 #include <gtest/gtest.h>
 
 #include "patina/base/error.h"
@@ -119,6 +122,75 @@ TEST(RunFolder, refuses_a_record_that_is_not_one) {
   EXPECT_THROW(RunFolder(folder.path() / "run"), Error);
   write_file(folder.path() / "run" / "stages.json", std::string_view("{"));
   EXPECT_THROW(RunFolder(folder.path() / "run"), Error);
+}
+
+TEST(RunFolder, takes_over_a_stage_with_outputs_and_record) {
+  const test::TemporaryFolder folder;
+  RunFolder first(folder.path() / "first"), second(folder.path() / "second");
+  second.adopt_stage(first, "work");
+  EXPECT_EQ(second.stage("work"), nullptr);
+  CountingStage{first}("key", "views/a.txt");
+  second.adopt_stage(first, "work");
+  CountingStage stage{second};
+  stage("key", "views/a.txt");
+  EXPECT_EQ(stage.runs, 0);
+  EXPECT_EQ(read_text_file(second.file("views/a.txt")), "key");
+  EXPECT_EQ(second.stage("work")->seconds, first.stage("work")->seconds);
+
+  // What is here stays as it is, also where it was changed by hand.
+  write_file(second.file("views/a.txt"), "painted over");
+  second.adopt_stage(first, "work");
+  EXPECT_EQ(read_text_file(second.file("views/a.txt")), "painted over");
+  CountingStage{first}("another key", "views/a.txt");
+  second.adopt_stage(first, "work");
+  EXPECT_EQ(read_text_file(second.file("views/a.txt")), "another key");
+}
+
+TEST(RunFolder, time_spent_before_a_kill_counts) {
+  const test::TemporaryFolder folder;
+  const auto wait = [] { std::this_thread::sleep_for(std::chrono::milliseconds(60)); };
+  {
+    RunFolder run(folder.path() / "run");
+    EXPECT_THROW(run.run_stage("work", "key", {},
+                               [&]() -> RunFolder::StageResult {
+                                 wait();
+                                 run.save_checkpoint("work", "key", 1, {1});
+                                 throw Error(ErrorCode::kInterrupted, "", "killed");
+                               }),
+                 Error);
+  }
+  RunFolder run(folder.path() / "run");
+  const StageRecord& record = run.run_stage("work", "key", {}, [&] {
+    EXPECT_TRUE(run.load_checkpoint("work", "key").has_value());
+    wait();
+    return RunFolder::StageResult{};
+  });
+  EXPECT_GE(record.seconds, 0.12);
+  EXPECT_LT(record.seconds, 60);
+  EXPECT_LT(run.run_stage("next", "key", {}, [] { return RunFolder::StageResult{}; }).seconds, 0.06);
+}
+
+TEST(RunFolder, memory_that_was_freed_before_a_stage_is_not_counted_as_its_own) {
+#if defined(__SANITIZE_ADDRESS__)
+  GTEST_SKIP() << "the address sanitiser keeps freed memory";
+#endif
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  const auto peak_of = [&](const char* name, size_t blocks) {
+    return run
+        .run_stage(name, "key", {},
+                   [&] {
+                     // Blocks below malloc's threshold for mappings of their own stay in its arena when
+                     // freed.
+                     std::vector<std::vector<char>> memory;
+                     for (size_t i = 0; i < blocks; ++i) memory.emplace_back(size_t{64} << 10, '1');
+                     return RunFolder::StageResult{};
+                   })
+        .peak_rss_mb;
+  };
+  const double before = peak_of("before", 0);
+  EXPECT_GT(peak_of("large", 2000), before + 100);
+  EXPECT_LT(peak_of("after", 0), before + 40);
 }
 
 }  // namespace

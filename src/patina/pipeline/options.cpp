@@ -90,6 +90,20 @@ Option choice_option(Option option, Names<Enum> names, Member member) {
   return option;
 }
 
+template <class Member>
+Option flag_option(Option option, Member member) {
+  option.is_flag = true;
+  option.placeholder = "true|false";
+  const Option named = option;
+  option.set = [=](Config& c, Values v) {
+    if (v.front() != "true" && v.front() != "false") refuse(named, "true or false", v.front());
+    member(c) = v.front() == "true";
+  };
+  option.get = [member](const Config& c) { return json(member(const_cast<Config&>(c))); };
+  option.default_text = option.get(Config{}).dump();
+  return option;
+}
+
 Option elevations_option() {
   Option option{
       .name = "elevation",
@@ -475,6 +489,14 @@ std::vector<Option> make_options() {
        .stages = kDetailStage},
       {{"paper", BiasScaling::kPaper}, {"additive", BiasScaling::kAdditive}},
       [](Config & c) -> auto& { return c.detail.bias_scaling; }));
+  add(flag_option(
+      {.name = "bias-controlnet",
+       .aliases = {},
+       .group = priors,
+       .placeholder = "",
+       .help = "Bias the self-attention of the ControlNets too, not that of the U-Net alone.",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.detail.bias_controlnet; }));
 
   add(number_option<int>(
       {.name = "fit-iterations",
@@ -547,9 +569,9 @@ std::vector<Option> make_options() {
 std::vector<std::string> as_strings(const json& value, const std::string& context) {
   const auto text = [&](const json& v) {
     if (v.is_string()) return v.get<std::string>();
-    if (v.is_number()) return v.dump();
+    if (v.is_number() || v.is_boolean()) return v.dump();
     throw Error(ErrorCode::kFormat, context,
-                fmt::format("expected text or a number, found {}", v.type_name()));
+                fmt::format("expected text, a number or a truth value, found {}", v.type_name()));
   };
   std::vector<std::string> out;
   if (value.is_array())

@@ -33,6 +33,7 @@ struct Option {
   std::string default_text = {};          // as --help shows it
   unsigned stages = kNoStage;             // who reads it (for showing it and for re-running)
   bool is_list = false;                   // takes several values
+  bool is_flag = false;                   // needs no value on the command line: "true"
 
   /// Parses, checks the range and stores. Throws Error{kUsage} that states the range and what was found.
   std::function<void(Config&, std::span<const std::string> values)> set = {};

@@ -15,6 +15,10 @@
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 namespace patina::pipeline {
 namespace {
 
@@ -22,8 +26,12 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 // Largest resident memory of this process since the last reset, in MB. Linux resets the mark when 5 is
-// written to clear_refs; where that is forbidden the mark is that of the whole process, an upper bound.
+// written to clear_refs; where that is forbidden the mark is that of the whole process, an upper bound. What
+// earlier work freed goes back to the system first, so that it is not counted as this stage's.
 void reset_peak_memory() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
@@ -105,57 +113,83 @@ const StageRecord* RunFolder::stage(std::string_view name) const {
   return found == stages_.end() ? nullptr : &*found;
 }
 
-void RunFolder::save_stages() const {
+bool RunFolder::is_complete(const StageRecord& stage) const {
+  return std::all_of(stage.outputs.begin(), stage.outputs.end(),
+                     [&](const std::string& output) { return fs::exists(path_ / output); });
+}
+
+// A stage takes its old place; what follows it is judged by its own key.
+void RunFolder::set_record(StageRecord record) {
+  const auto place = std::find_if(stages_.begin(), stages_.end(),
+                                  [&](const StageRecord& s) { return s.name == record.name; });
+  if (place == stages_.end())
+    stages_.push_back(std::move(record));
+  else
+    *place = std::move(record);
   json list = json::array();
   for (const StageRecord& stage : stages_) list.push_back(to_json(stage));
   write_json(path_ / "stages.json", list);
 }
 
+double RunFolder::seconds_so_far() const {
+  return earlier_seconds_ + std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+double RunFolder::peak_so_far_mb() const {
+  return std::max(earlier_peak_mb_, peak_memory_mb());
+}
+
 const StageRecord& RunFolder::run_stage(std::string_view name, const std::string& key,
                                         const Progress& progress, const std::function<StageResult()>& work) {
-  if (const StageRecord* last = stage(name); last && last->key == key) {
-    const bool complete = std::all_of(last->outputs.begin(), last->outputs.end(),
-                                      [&](const std::string& output) { return fs::exists(path_ / output); });
-    if (complete) {
-      for (const std::string& warning : last->warnings) progress.warn(warning);
-      return *last;
-    }
+  if (const StageRecord* last = stage(name); last && last->key == key && is_complete(*last)) {
+    for (const std::string& warning : last->warnings) progress.warn(warning);
+    return *last;
   }
   progress.throw_if_stopped();
   reset_peak_memory();
-  const auto start = std::chrono::steady_clock::now();
+  start_ = std::chrono::steady_clock::now();
+  earlier_seconds_ = earlier_peak_mb_ = 0;
   StageResult result = work();
-  StageRecord record{
-      .name = std::string(name),
-      .key = key,
-      .outputs = std::move(result.outputs),
-      .seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
-      .peak_rss_mb = peak_memory_mb(),
-      .metrics = std::move(result.metrics),
-      .warnings = std::move(result.warnings)};
-  // A stage takes its old place; what follows it is judged by its own key.
-  const auto place =
-      std::find_if(stages_.begin(), stages_.end(), [&](const StageRecord& s) { return s.name == name; });
-  if (place == stages_.end())
-    stages_.push_back(std::move(record));
-  else
-    *place = std::move(record);
-  save_stages();
+  set_record({.name = std::string(name),
+              .key = key,
+              .outputs = std::move(result.outputs),
+              .seconds = seconds_so_far(),
+              .peak_rss_mb = peak_so_far_mb(),
+              .metrics = std::move(result.metrics),
+              .warnings = std::move(result.warnings)});
   std::error_code ignored;
   fs::remove(path_ / checkpoint_name(name), ignored);
   return *stage(name);
 }
 
+void RunFolder::adopt_stage(const RunFolder& from, std::string_view name) {
+  const StageRecord* record = from.stage(name);
+  if (!record || !from.is_complete(*record)) return;
+  if (const StageRecord* own = stage(name); own && own->key == record->key && is_complete(*own)) return;
+  for (const std::string& output : record->outputs) {
+    fs::create_directories((path_ / output).parent_path());
+    write_file_with(path_ / output, [&](const fs::path& temporary) {
+      fs::copy_file(from.path_ / output, temporary, fs::copy_options::overwrite_existing);
+    });
+  }
+  set_record(*record);
+}
+
 void RunFolder::save_checkpoint(std::string_view stage, const std::string& key, int step,
                                 const std::vector<uint8_t>& bytes) const {
-  const std::string header = json{{"key", key}, {"step", step}, {"hash", hash_bytes(bytes)}}.dump() + "\n";
+  const json values = {{"key", key},
+                       {"step", step},
+                       {"hash", hash_bytes(bytes)},
+                       {"seconds", seconds_so_far()},
+                       {"peak_rss_mb", peak_so_far_mb()}};
+  const std::string header = values.dump() + "\n";
   std::vector<uint8_t> file(header.begin(), header.end());
   file.insert(file.end(), bytes.begin(), bytes.end());
   write_file(path_ / checkpoint_name(stage), file);
 }
 
 std::optional<RunFolder::SavedCheckpoint> RunFolder::load_checkpoint(std::string_view stage,
-                                                                     const std::string& key) const {
+                                                                     const std::string& key) {
   const fs::path path = path_ / checkpoint_name(stage);
   if (!fs::exists(path)) return std::nullopt;
   const std::vector<uint8_t> file = read_file(path, ~uint64_t{0});
@@ -164,6 +198,8 @@ std::optional<RunFolder::SavedCheckpoint> RunFolder::load_checkpoint(std::string
   if (line_end == file.end() || !header.is_object() || header.value("key", "") != key) return std::nullopt;
   SavedCheckpoint saved{.step = header.value("step", 0), .bytes = {line_end + 1, file.end()}};
   if (header.value("hash", "") != hash_bytes(saved.bytes)) return std::nullopt;
+  earlier_seconds_ = header.value("seconds", 0.0);
+  earlier_peak_mb_ = header.value("peak_rss_mb", 0.0);
   return saved;
 }
 

@@ -6,6 +6,7 @@
 //   views/  detail/  textures/  metrics.json  report.html  turntable.webp
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -24,8 +25,8 @@ struct StageRecord {
   std::string name;
   std::string key;                   // hash of everything the stage read
   std::vector<std::string> outputs;  // paths relative to the run folder
-  double seconds = 0;
-  double peak_rss_mb = 0;  // largest resident memory while the stage ran
+  double seconds = 0;                // with those spent before the last checkpoint of a run that was killed
+  double peak_rss_mb = 0;            // largest resident memory while the stage ran
   nlohmann::json metrics = nlohmann::json::object();
   std::vector<std::string> warnings;  // shown again in the report
 };
@@ -58,22 +59,33 @@ class RunFolder {
   const std::vector<StageRecord>& stages() const { return stages_; }
   const StageRecord* stage(std::string_view name) const;
 
+  /// Takes over a stage from a run that has run it, outputs and record, unless it is here already. The
+  /// stage is then skipped as if it had run here. Does nothing if `from` has not run it.
+  void adopt_stage(const RunFolder& from, std::string_view name);
+
   /// Partial results of a long stage, kept under the stage's key: a checkpoint written for other inputs is
-  /// not returned.
+  /// not returned. Both are for the `work` of run_stage: time and memory spent until the checkpoint go with
+  /// it into the stage's record.
   void save_checkpoint(std::string_view stage, const std::string& key, int step,
                        const std::vector<uint8_t>& bytes) const;
   struct SavedCheckpoint {
     int step = 0;
     std::vector<uint8_t> bytes;
   };
-  std::optional<SavedCheckpoint> load_checkpoint(std::string_view stage, const std::string& key) const;
+  std::optional<SavedCheckpoint> load_checkpoint(std::string_view stage, const std::string& key);
 
  private:
-  void save_stages() const;
+  bool is_complete(const StageRecord& stage) const;
+  void set_record(StageRecord record);
+  double seconds_so_far() const;
+  double peak_so_far_mb() const;
 
   std::filesystem::path path_;
   int lock_ = -1;
   std::vector<StageRecord> stages_;
+  // Of the stage that is running: when it started here, and what a killed run had spent on it.
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double earlier_seconds_ = 0, earlier_peak_mb_ = 0;
 };
 
 /// A JSON file; throws Error{kFormat} naming the file where it is not JSON.

@@ -1,10 +1,11 @@
 // The second stage: noise and correspondences from the geometry, then the diffusion model over the whole
 // grid.
+#include <chrono>
+
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/correspond/consistency.h"
 #include "patina/correspond/correspondences.h"
 #include "patina/correspond/noise.h"
 #include "patina/image/image_io.h"
@@ -68,28 +69,49 @@ json noise_metrics(const correspond::NoiseField& noise, int grid) {
   return worst;
 }
 
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 }  // namespace
 
+PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views, const Config& config,
+                              const diffusion::Model& model, const Progress& progress) {
+  const int scale = model.latent_scale();
+  if (bench.cameras[0].width % scale || bench.cameras[0].height % scale)
+    throw Error(ErrorCode::kUsage, "--resolution", fmt::format("this model needs a multiple of {}", scale));
+
+  PreparedDetail prepared;
+  auto start = std::chrono::steady_clock::now();
+  correspond::NoiseField noise = correspond::make_noise(
+      *bench.scene, bench.cameras, scale, {.mode = config.noise, .seed = config.seed}, progress);
+  prepared.noise_seconds = seconds_since(start);
+  prepared.noise_metrics = noise_metrics(noise, views.set.grid);
+
+  prepared.inputs = {.grid = views.set.grid,
+                     .tile_views = views.tile,
+                     .normal_views = views.normal,
+                     .noise = std::move(noise.values),
+                     .bias_levels = {}};
+  if (config.detail.bias_weight != 0) {
+    start = std::chrono::steady_clock::now();
+    prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
+    prepared.correspond_seconds = seconds_since(start);
+  }
+  return prepared;
+}
+
 std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& views, const Config& config,
-                                RunFolder& run, const Progress& progress) {
+                                RunFolder& run, const Progress& progress,
+                                std::optional<diffusion::Model>* shared_model) {
   const std::string key = detail_key(bench, views, config);
   run.run_stage("detail", key, progress, [&] {
-    const diffusion::Model model(config.model, {.dtype = config.dtype, .num_threads = config.num_threads});
-    if (bench.cameras[0].width % model.latent_scale() || bench.cameras[0].height % model.latent_scale())
-      throw Error(ErrorCode::kUsage, "--resolution",
-                  fmt::format("this model needs a multiple of {}", model.latent_scale()));
-
-    const correspond::NoiseField noise =
-        correspond::make_noise(*bench.scene, bench.cameras, model.latent_scale(),
-                               {.mode = config.noise, .seed = config.seed}, progress);
-    diffusion::DetailInputs inputs{.grid = views.set.grid,
-                                   .tile_views = views.tile,
-                                   .normal_views = views.normal,
-                                   .noise = noise.values,
-                                   .bias_levels = {}};
-    if (config.detail.bias_weight != 0)
-      inputs.bias_levels =
-          correspond::bias_levels(*bench.scene, bench.cameras, progress, model.latent_scale());
+    const auto start = std::chrono::steady_clock::now();
+    std::optional<diffusion::Model> own_model;
+    std::optional<diffusion::Model>& model = shared_model ? *shared_model : own_model;
+    if (!model) model.emplace(config.model, diffusion::ModelOptions{config.dtype, config.num_threads});
+    const double load_seconds = seconds_since(start);
+    const PreparedDetail prepared = prepare_detail(bench, views, config, *model, progress);
 
     diffusion::DetailOptions options = config.detail;
     options.seed = config.seed;
@@ -99,14 +121,22 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     };
     if (auto saved = run.load_checkpoint("detail", key))
       hooks.resume = diffusion::Checkpoint{.next_step = saved->step, .bytes = std::move(saved->bytes)};
-    const std::vector<Image> edited = diffusion::generate_detail(model, inputs, options, hooks, progress);
+    const std::vector<Image> edited =
+        diffusion::generate_detail(*model, prepared.inputs, options, hooks, progress);
 
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
     }
-    result.metrics = {{"noise", noise_metrics(noise, views.set.grid)}, {"model", model.description()}};
+    const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model->latent_channels());
+    result.metrics = {{"noise", prepared.noise_metrics},
+                      {"model", model->description()},
+                      {"latent_pixels", latent_pixels},
+                      {"seconds",
+                       {{"load", load_seconds},
+                        {"noise", prepared.noise_seconds},
+                        {"correspond", prepared.correspond_seconds}}}};
     return result;
   });
   return load_edited(views, run);

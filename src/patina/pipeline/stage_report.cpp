@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "patina/base/files.h"
-#include "patina/correspond/consistency.h"
 #include "patina/image/color.h"
 #include "patina/image/image_io.h"
+#include "patina/pipeline/measures.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/stages.h"
 #include "patina/report/report.h"
@@ -16,20 +16,6 @@ namespace patina::pipeline {
 using nlohmann::json;
 
 namespace {
-
-// Mean over the views of a measure between two pictures under the loss's weights, so that untrusted
-// silhouettes do not count.
-template <class Measure>
-float mean_over_views(std::span<const Image> a, std::span<const Image> b, std::span<const Image> weights,
-                      Measure measure) {
-  double sum = 0;
-  for (size_t v = 0; v < a.size(); ++v) sum += measure(a[v], b[v], weights[v]);
-  return static_cast<float>(sum / static_cast<double>(a.size()));
-}
-
-json json_number(float value) {
-  return std::isfinite(value) ? json(value) : json(nullptr);
-}
 
 std::vector<Image> read_numbered(const RunFolder& run, std::string_view prefix,
                                  const std::vector<render::Camera>& cameras) {
@@ -112,19 +98,14 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
                                                   .seed = config.seed},
                                          .exposure_ev = views.set.exposure_ev};
         const views::ViewSet rendered = views::render_views(after, bench.cameras, options, progress);
-        std::vector<Image> pictures, weights;
+        std::vector<Image> pictures;
         for (size_t v = 0; v < rendered.views.size(); ++v) {
           pictures.push_back(views::tile_control(rendered.views[v], views.set.exposure_ev));
-          weights.push_back(
-              inverse::loss_weight(views.set.views[v].gbuffer, bench.enhanced, config.fit.boundary_pixels));
           result.outputs.push_back(numbered("report/rendered", v, ".png"));
           write_image(run.file(result.outputs.back()), pictures.back());
         }
-        const correspond::Consistency consistency =
-            correspond::edit_consistency(*bench.scene, views.set, views.tile, edited);
-        result.metrics["consistency"] = {{"edit_correlation", json_number(consistency.edit_correlation)},
-                                         {"edit_psnr", json_number(consistency.edit_psnr)},
-                                         {"covisible_pixels", consistency.covisible_pixels}};
+        const std::vector<Image> weights = measure_weights(bench, views, config);
+        result.metrics["consistency"] = consistency_metrics(bench, views, edited);
         result.metrics["fit"] = {
             {"psnr", json_number(mean_over_views(pictures, edited, weights, report::psnr))},
             {"sharpness", json_number(mean_over_views(pictures, edited, weights, report::sharpness_kept))},

@@ -4,6 +4,7 @@
 // as they are.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,9 +26,21 @@ struct RenderedViews {
 RenderedViews render_stage(const Workbench& bench, const Config& config, RunFolder& run,
                            const Progress& progress);
 
-/// Lets the diffusion model edit the views → detail/edited_NN.png.
+/// What the diffusion model is given beside the options: control images, noise and correspondences. Its seed
+/// is config.seed. Throws Error{kUsage} if the views do not fit the model.
+struct PreparedDetail {
+  diffusion::DetailInputs inputs;
+  nlohmann::json noise_metrics;
+  double noise_seconds = 0, correspond_seconds = 0;
+};
+PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views, const Config& config,
+                              const diffusion::Model& model, const Progress& progress);
+
+/// Lets the diffusion model edit the views → detail/edited_NN.png. `shared_model`, if given, is loaded where
+/// it is empty and needed, and stays: runs of the same model then load it once.
 std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& views, const Config& config,
-                                RunFolder& run, const Progress& progress);
+                                RunFolder& run, const Progress& progress,
+                                std::optional<diffusion::Model>* shared_model = nullptr);
 
 /// Carries the edit into the textures → textures/NN_<material>_<slot>.png, textures/loss.json.
 struct FittedMaterials {

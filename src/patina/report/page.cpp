@@ -7,56 +7,24 @@
 
 #include <fmt/format.h>
 
-#include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/parallel.h"
 #include "patina/report/html.h"
 #include "patina/report/loss_plot.h"
 #include "patina/report/metrics_table.h"
+#include "patina/report/page_parts.h"
 #include "patina/report/page_style.h"
 #include "patina/report/report.h"
-#include "patina/report/scale.h"
-#include "patina/report/webp.h"
 
 namespace patina::report {
 namespace {
 
-// Pictures larger than they are ever shown only make the page slow to load: 9 views before, edited and after
-// at 512 pixels and quality 82 take about 1 MB.
+// Pictures larger than they are ever shown only make the page slow to load.
 constexpr int kViewSide = 512;
 constexpr int kTextureSide = 512, kTextureSideOfMany = 256;
 constexpr size_t kManyTextures = 24;
-constexpr float kQuality = 82;
-
-// An image as the page shows it. Colours are averaged in linear light; normals and roughness as they are
-// stored.
-std::string embedded(const Image& image, int max_side, bool is_color) {
-  const double scale = std::min(1.0, static_cast<double>(max_side) / std::max(image.width, image.height));
-  const int width = std::max(1, static_cast<int>(std::lround(scale * image.width)));
-  const int height = std::max(1, static_cast<int>(std::lround(scale * image.height)));
-  const Image rgb = as_rgb(image);
-  return data_uri(
-      encode_webp(is_color ? scaled_srgb(rgb, width, height) : scaled(rgb, width, height), kQuality),
-      "image/webp");
-}
-
-std::string head(const ReportData& data) {
-  return fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
-      "'unsafe-inline'; "
-      "script-src 'unsafe-inline'\">\n<title>{} · patina</title>\n<style>{}</style>\n</head>\n",
-      escaped(data.title, 200), kPageStyle);
-}
 
 std::string heading(const ReportData& data) {
-  std::string html =
-      "<header>\n<p class=\"mark\">patina report</p>\n<h1>" + escaped(data.title, 200) + "</h1>\n";
-  if (!data.prompt.empty()) html += "<p class=\"prompt\">" + escaped(data.prompt) + "</p>\n";
-  if (!data.negative_prompt.empty())
-    html += "<p class=\"negative\">without <em>" + escaped(data.negative_prompt) + "</em></p>\n";
-
   std::vector<std::string> facts;
   if (!data.before.empty())
     facts.push_back(fmt::format("<b>{}</b> views of <b>{} × {}</b>", data.before.size(), data.before[0].width,
@@ -67,19 +35,7 @@ std::string heading(const ReportData& data) {
   if (!data.loss.empty()) facts.push_back(fmt::format("<b>{}</b> iterations of the fit", data.loss.size()));
   if (const double seconds = total_seconds(data.metrics); seconds > 0)
     facts.push_back("<b>" + duration(seconds) + "</b>");
-  if (!facts.empty()) {
-    html += "<ul class=\"facts\">";
-    for (const std::string& fact : facts) html += "<li>" + fact + "</li>";
-    html += "</ul>\n";
-  }
-  return html + "</header>\n";
-}
-
-std::string warnings(const ReportData& data) {
-  if (data.warnings.empty()) return "";
-  std::string html = "<section class=\"warnings\">\n<h2>What you should know</h2>\n<ul>\n";
-  for (const std::string& warning : data.warnings) html += "<li>" + escaped(warning) + "</li>\n";
-  return html + "</ul>\n</section>\n";
+  return page_heading("patina report", data.title, data.prompt, data.negative_prompt, facts);
 }
 
 std::string turntable(const std::filesystem::path& page, const ReportData& data) {
@@ -197,40 +153,22 @@ std::string textures(const ReportData& data) {
   return html + "</div>\n</section>\n";
 }
 
-std::string section(std::string_view title, std::string_view lead, const std::string& content) {
-  if (content.empty()) return "";
-  std::string html = fmt::format("<section>\n<h2>{}</h2>\n", title);
-  if (!lead.empty()) html += fmt::format("<p class=\"lead\">{}</p>\n", lead);
-  return html + "<div class=\"scroll\">" + content + "</div>\n</section>\n";
-}
-
-std::string config(const ReportData& data) {
-  if (data.config.empty()) return "";
-  return "<details>\n<summary>Every value that was used</summary>\n<pre>" +
-         escaped_lines(data.config.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) +
-         "</pre>\n</details>\n";
-}
-
 }  // namespace
 
 void write_report(const std::filesystem::path& path, const ReportData& data) {
-  std::string html = head(data);
-  html += "<body>\n";
+  std::string html = page_begin(data.title);
   html += heading(data);
-  html += warnings(data);
+  html += page_warnings(data.warnings);
   html += turntable(path, data);
   html += views(data);
   html += textures(data);
-  html += section("Quality", "The marks are rules of thumb; your eye on the pictures above comes first.",
-                  metrics_table(data.metrics));
-  html += section("Fit", "How far the renders with the new textures are from the edited views.",
-                  loss_plot(data.loss));
-  html += section("Time and memory", "", stage_table(data.metrics));
-  html += config(data);
-  html += fmt::format(
-      "<footer>Made by patina {}. This page is one file and reads nothing from the network.</footer>\n",
-      PATINA_VERSION);
-  html += fmt::format("<script>{}</script>\n</body>\n</html>\n", kPageScript);
+  html += page_section("Quality", "The marks are rules of thumb; your eye on the pictures above comes first.",
+                       metrics_table(data.metrics));
+  html += page_section("Fit", "How far the renders with the new textures are from the edited views.",
+                       loss_plot(data.loss));
+  html += page_section("Time and memory", "", stage_table(data.metrics));
+  html += page_config(data.config);
+  html += page_end(kPageScript);
   write_file(path, html);
 }
 

@@ -1,0 +1,115 @@
+#include "patina/pipeline/show_attention.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "patina/base/error.h"
+#include "patina/image/image_io.h"
+#include "patina/pipeline/enhance.h"
+#include "patina/pipeline/pick_point.h"
+#include "patina/report/html.h"
+#include "patina/report/report.h"
+
+namespace patina::pipeline {
+
+namespace fs = std::filesystem;
+using diffusion::AttentionLayer;
+
+namespace {
+
+// The latent pixel of the layer's grid that covers a pixel of a view.
+int32_t latent_pixel_at(const AttentionLayer& layer, int grid, int view, const vec2& pixel,
+                        const render::Camera& camera) {
+  const auto columns = static_cast<int>(layer.width) / grid, rows = static_cast<int>(layer.height) / grid;
+  const int x =
+      std::min(static_cast<int>(pixel.x * static_cast<float>(columns) / static_cast<float>(camera.width)),
+               columns - 1);
+  const int y = std::min(
+      static_cast<int>(pixel.y * static_cast<float>(rows) / static_cast<float>(camera.height)), rows - 1);
+  return (view / grid * rows + y) * static_cast<int>(layer.width) + view % grid * columns + x;
+}
+
+}  // namespace
+
+ShownAttention show_attention(const Config& config, const AttentionOptions& options, RunFolder& run,
+                              const Progress& progress) {
+  if (config.detail.bias_weight == 0)
+    throw Error(ErrorCode::kUsage, "--bias",
+                "expected other than 0: attention is shown without and with the bias");
+  check_inputs(config);
+  const Workbench bench = open_workbench(config, progress);
+  const diffusion::Model model(config.model, {config.dtype, config.num_threads});
+  const render::Camera& camera = bench.cameras[0];
+  const int grid = views::grid_of(bench.cameras.size());
+  const AttentionLayer layer = diffusion::find_layer(
+      diffusion::self_attention_layers(model, grid * camera.width, grid * camera.height), options.layer);
+
+  const RenderedViews views = render_stage(bench, config, run, progress);
+  const PickedPoint point = options.pixel ? point_at(*bench.scene, views.set, options.view.value_or(0),
+                                                     options.pixel->first, options.pixel->second)
+                                          : best_point(*bench.scene, views.set, options.view);
+
+  const PreparedDetail prepared = prepare_detail(bench, views, config, model, progress);
+  diffusion::DetailOptions detail = config.detail;
+  detail.seed = config.seed;
+  ShownAttention shown;
+  shown.captured =
+      diffusion::capture_attention(model, prepared.inputs, detail, layer, options.evaluation, progress);
+  if (shown.captured.bias_level < 0)
+    throw Error(ErrorCode::kUsage, "--layer",
+                fmt::format("the bias does not act at the resolution of {}; choose a finer layer",
+                            diffusion::short_name(layer)));
+  const attention::KeyBuckets& buckets =
+      prepared.inputs.bias_levels[static_cast<size_t>(shown.captured.bias_level)];
+
+  shown.view = point.view;
+  shown.pixel = point.sights[static_cast<size_t>(point.view)]->pixel;
+  report::AttentionFigure& figure = shown.figure;
+  figure.views = views::tile_grid(views.tile);
+  figure.grid = grid;
+  figure.cells = {static_cast<int>(layer.width), static_cast<int>(layer.height)};
+  figure.query = latent_pixel_at(layer, grid, shown.view, shown.pixel, camera);
+  figure.biased_keys = attention::biased_keys(buckets, figure.query);
+  figure.without = diffusion::attention_row(shown.captured, figure.query, {}, 0);
+  figure.with =
+      diffusion::attention_row(shown.captured, figure.query, figure.biased_keys, shown.captured.beta);
+  if (figure.biased_keys.empty())
+    progress.warn("No latent pixel of another view lands near this point, so the bias changes nothing here.");
+  return shown;
+}
+
+void check_attention_output(const fs::path& path) {
+  if (path.extension() != ".html" && path.extension() != ".png")
+    throw Error(ErrorCode::kUsage, "--output",
+                fmt::format("expected a name that ends in .html (a page) or .png (a picture), found '{}'",
+                            printable(path.string())));
+}
+
+void write_attention(const ShownAttention& shown, const Config& config, const fs::path& path) {
+  check_attention_output(path);
+  if (path.extension() == ".png") {
+    const std::vector<Image> panels = report::attention_panels(shown.figure);
+    write_image(path, report::contact_sheet(panels, static_cast<int>(panels.size()), panels[0].width));
+    return;
+  }
+  const diffusion::CapturedAttention& c = shown.captured;
+  report::AttentionPage page;
+  page.title = config.asset.filename().string();
+  page.prompt = config.detail.prompt, page.negative_prompt = config.detail.negative_prompt;
+  page.figure = shown.figure;
+  page.beta = c.beta;
+  const bool additive = config.detail.bias_scaling == diffusion::BiasScaling::kAdditive;
+  page.facts = {fmt::format("layer <b>{}</b>", report::escaped(diffusion::short_name(c.layer))),
+                fmt::format("<b>{} × {}</b> latent pixels", c.layer.width, c.layer.height),
+                fmt::format("<b>{}</b> heads of <b>{}</b>", c.layer.num_heads, c.layer.head_dim),
+                fmt::format("evaluation <b>{}</b> of <b>{}</b>, timestep <b>{:.0f}</b>", c.evaluation,
+                            c.num_evaluations, c.timestep),
+                fmt::format("view <b>{}</b>, pixel <b>{:.0f}, {:.0f}</b>", shown.view + 1,
+                            std::floor(shown.pixel.x), std::floor(shown.pixel.y)),
+                fmt::format("w = <b>{}</b>, β = {} = <b>{}</b>", config.detail.bias_weight,
+                            additive ? "w" : "w/√d", report::number(c.beta))};
+  report::write_attention_page(path, page);
+}
+
+}  // namespace patina::pipeline

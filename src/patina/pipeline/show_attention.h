@@ -1,0 +1,43 @@
+// What one surface point attends to in the U-Net, without and with the bias [Hadadan2025, Fig. 3].
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "patina/base/progress.h"
+#include "patina/diffusion/attention_probe.h"
+#include "patina/pipeline/config.h"
+#include "patina/pipeline/run_folder.h"
+#include "patina/report/attention_page.h"
+
+namespace patina::pipeline {
+
+struct AttentionOptions {
+  std::optional<int> view = {};                   // counted from 0
+  std::optional<std::pair<int, int>> pixel = {};  // x, y of an image pixel of that view (or of the first);
+                                                  // nullopt: where most views see the surface
+  std::string layer = {};                         // as find_layer takes it
+  int evaluation = 0;                             // of the network, from 1; 0: the middle one
+};
+
+struct ShownAttention {
+  report::AttentionFigure figure;
+  diffusion::CapturedAttention captured;
+  int view = 0;      // of the query, counted from 0
+  vec2 pixel{0.0f};  // where the point is seen in it
+};
+
+/// Renders the views into `run` (or takes those that are there), runs the model up to the evaluation, the
+/// bias acting as configured, and takes the row of the picked point. Throws Error{kUsage} where there is no
+/// such layer, view, pixel or evaluation, and where no bias acts in that layer.
+ShownAttention show_attention(const Config& config, const AttentionOptions& options, RunFolder& run,
+                              const Progress& progress);
+
+/// Writes it as a page (.html) or as one picture of three panels (.png).
+void write_attention(const ShownAttention& shown, const Config& config, const std::filesystem::path& path);
+/// Throws Error{kUsage} for other extensions, before anything is computed.
+void check_attention_output(const std::filesystem::path& path);
+
+}  // namespace patina::pipeline

@@ -1,0 +1,243 @@
+// The ablation: every step is there with its pictures, its numbers are those of the run folders, and it can
+// be killed and continued.
+#include "patina/pipeline/ablate.h"
+
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/correspond/consistency.h"
+#include "patina/inverse/fit.h"
+#include "patina/pipeline/enhance.h"
+#include "patina/report/report.h"
+#include "process.h"
+#include "support.h"
+
+namespace patina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::TemporaryFolder;
+
+std::vector<std::string> ablate_command(const fs::path& folder, const std::vector<std::string>& more = {}) {
+  const fs::path kettle = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+  std::vector<std::string> command{test::built_program("patina").string(),
+                                   "ablate",
+                                   kettle.string(),
+                                   "-p",
+                                   "a rusty old kettle",
+                                   "-m",
+                                   (test::data_dir() / "tiny-sd").string(),
+                                   "--resolution",
+                                   "64",
+                                   "--samples",
+                                   "1",
+                                   "--max-depth",
+                                   "2",
+                                   "--light-samples",
+                                   "8",
+                                   "-s",
+                                   "4",
+                                   "--strength",
+                                   "0.5",
+                                   "--fit-iterations",
+                                   "3",
+                                   "--texture-size",
+                                   "64",
+                                   "-o",
+                                   folder.string()};
+  command.insert(command.end(), more.begin(), more.end());
+  return command;
+}
+
+void run_ok(const std::vector<std::string>& command) {
+  const test::ProcessResult result = test::run_process(command, {.seconds = 300});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+}
+
+json numbers_of(const fs::path& folder) {
+  return read_json(folder / "ablation.json");
+}
+
+// The steps without what differs from run to run.
+json without_cost(json steps) {
+  for (json& step : steps) step.erase("seconds"), step.erase("peak_rss_mb");
+  return steps;
+}
+
+TEST(Ablate, shows_every_step_with_the_numbers_of_its_run_folder) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "out";
+  run_ok(ablate_command(out, {"--views", "4,1", "--weights", "1.2"}));
+  const json numbers = numbers_of(out);
+  const std::string page = read_text_file(out / "ablation.html");
+
+  std::vector<std::string> names;
+  for (const json& step : numbers.at("steps")) {
+    SCOPED_TRACE(step.dump());
+    names.push_back(step.at("name"));
+    // What people see.
+    for (const char* kind : {"all views", "crop 1", "crop 2", "rendered with its textures", "base colour"})
+      EXPECT_NE(page.find("alt=\"" + step.at("title").get<std::string>() + ": " + kind + "\""),
+                std::string::npos)
+          << kind;
+    EXPECT_NE(page.find(step.at("note").get<std::string>()), std::string::npos);
+
+    // What the run folder gives by hand.
+    const Config config = read_config(out / step.at("run").get<std::string>());
+    const RunFolder run(config.run);
+    const Workbench bench = open_workbench(config, {});
+    const RenderedViews views = load_views(bench, run);
+    const std::vector<Image> edited = load_edited(views, run);
+    const auto consistency = correspond::edit_consistency(*bench.scene, views.set, views.tile, edited);
+    EXPECT_NEAR(step.at("edit_correlation").get<double>(), consistency.edit_correlation, 1e-6);
+    EXPECT_NEAR(step.at("edit_psnr").get<double>(), consistency.edit_psnr, 1e-4);
+    double sharpness = 0;
+    for (size_t v = 0; v < edited.size(); ++v)
+      sharpness += report::sharpness_kept(
+          edited[v], views.tile[v],
+          inverse::loss_weight(views.set.views[v].gbuffer, bench.enhanced, config.fit.boundary_pixels));
+    EXPECT_NEAR(step.at("edit_sharpness").get<double>(), sharpness / static_cast<double>(edited.size()),
+                1e-5);
+    const json metrics = read_json(run.file("metrics.json"));
+    EXPECT_EQ(step.at("texture_sharpness"), metrics.at("fit").at("sharpness"));
+    EXPECT_EQ(step.at("texture_psnr"), metrics.at("fit").at("psnr"));
+    const json& seconds = step.at("seconds");
+    const double parts = seconds.at("noise").get<double>() + seconds.at("correspond").get<double>() +
+                         seconds.at("diffusion").get<double>();
+    EXPECT_GT(seconds.at("diffusion").get<double>(), 0);
+    EXPECT_LE(parts, run.stage("detail")->seconds);
+    EXPECT_EQ(seconds.at("correspond").get<double>() > 0, step.at("name") == "bias-1.2");
+    EXPECT_EQ(seconds.at("fit").get<double>(), run.stage("fit")->seconds);
+    EXPECT_EQ(step.at("peak_rss_mb").at("diffusion").get<double>(), run.stage("detail")->peak_rss_mb);
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"baseline", "tile", "noise-paper", "noise-exact", "bias-1.2"}));
+
+  // The table of view counts: the step itself, and once more with the other number.
+  ASSERT_EQ(numbers.at("view_counts").size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    const json& row = numbers["view_counts"][i];
+    EXPECT_EQ(row.at("views"), i == 0 ? 4 : 1);
+    EXPECT_EQ(row.at("latent_pixels"), i == 0 ? 256 : 64);
+    EXPECT_GT(row.at("peak_rss_mb").get<double>(), 10);
+  }
+  EXPECT_EQ(numbers["view_counts"][0]["seconds"]["diffusion"], numbers["steps"][4]["seconds"]["diffusion"]);
+  EXPECT_NE(page.find("More views"), std::string::npos);
+}
+
+TEST(Ablate, renders_once_and_runs_nothing_twice) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "out";
+  const std::vector<std::string> options{"--views", "4", "--weights", "1.2", "--no-fit"};
+  run_ok(ablate_command(out, options));
+  const fs::path steps = out / "steps";
+  std::set<std::string> renders, edits, render_seconds;
+  std::string stages;
+  for (const auto& step : fs::directory_iterator(steps)) {
+    renders.insert(hash_file(step.path() / "views" / "tile_00.png"));
+    edits.insert(hash_file(step.path() / "detail" / "edited_00.png"));
+    for (const json& stage : read_json(step.path() / "stages.json"))
+      if (stage.at("name") == "render") render_seconds.insert(stage.at("seconds").dump());
+    stages += read_text_file(step.path() / "stages.json");
+  }
+  EXPECT_EQ(renders.size(), 1u);
+  EXPECT_EQ(render_seconds.size(), 1u);  // one rendering that all steps took over
+  EXPECT_EQ(edits.size(), 5u);
+  const std::string page = read_text_file(out / "ablation.html");
+  EXPECT_EQ(page.find("textures kept"), std::string::npos);
+  EXPECT_FALSE(numbers_of(out)["steps"][0].contains("texture_sharpness"));
+
+  // A second weight: the page holds both, and what was there is taken as it is.
+  const json before = numbers_of(out).at("steps");
+  run_ok(ablate_command(out, {"--views", "4", "--weights", "1.2", "2.4", "--no-fit"}));
+  json after = numbers_of(out).at("steps");
+  ASSERT_EQ(after.size(), 6u);
+  EXPECT_EQ(after[5].at("name"), "bias-2.4");
+  after.erase(5);
+  EXPECT_EQ(after, before);
+}
+
+TEST(Ablate, a_killed_one_continues_and_gives_the_same_numbers) {
+  const TemporaryFolder folder;
+  const fs::path whole = folder.path() / "whole", broken = folder.path() / "broken";
+  const std::vector<std::string> options{"--views", "4", "--weights", "1.2", "--no-fit", "-q"};
+  const double seconds = test::run_process(ablate_command(whole, options), {.seconds = 300}).seconds;
+  int num_kills = 0;
+  for (const double share : {0.5, 0.75}) {
+    const auto result = test::run_process(ablate_command(broken, options), {.kill_after = share * seconds});
+    num_kills += result.signal != 0;
+  }
+  EXPECT_GT(num_kills, 0);
+  run_ok(ablate_command(broken, options));
+  EXPECT_EQ(without_cost(numbers_of(broken).at("steps")), without_cost(numbers_of(whole).at("steps")));
+}
+
+TEST(Ablate, every_step_changes_one_thing) {
+  Config config;
+  config.detail.tile_scale = 0.7f;
+  config.detail.bias_weight = 5;
+  config.seed = 3;
+  AblationOptions options;
+  options.weights = {0.6f, 1.8f};
+  options.scalings = {diffusion::BiasScaling::kPaper, diffusion::BiasScaling::kAdditive};
+  options.view_counts = {16, 4};
+  const std::vector<AblationStep> steps = ablation_steps(config, options, "out");
+  ASSERT_EQ(steps.size(), 8u);
+  using correspond::NoiseMode;
+  const NoiseMode noise[] = {NoiseMode::kIndependent, NoiseMode::kIndependent, NoiseMode::kPaper,
+                             NoiseMode::kExact,       NoiseMode::kExact,       NoiseMode::kExact,
+                             NoiseMode::kExact,       NoiseMode::kExact};
+  const float weight[] = {0, 0, 0, 0, 0.6f, 1.8f, 0.6f, 1.8f};
+  std::set<std::string> folders;
+  for (size_t i = 0; i < steps.size(); ++i) {
+    const Config& c = steps[i].config;
+    EXPECT_EQ(c.detail.tile_scale, i == 0 ? 0.0f : 0.7f);
+    EXPECT_EQ(c.noise, noise[i]);
+    EXPECT_EQ(c.detail.bias_weight, weight[i]);
+    EXPECT_EQ(c.detail.bias_scaling == diffusion::BiasScaling::kAdditive, i >= 6);
+    EXPECT_EQ(c.orbit.num_views, 16);
+    EXPECT_EQ(c.seed, 3u);
+    folders.insert(c.run.string());
+  }
+  EXPECT_EQ(folders.size(), steps.size());
+  EXPECT_TRUE(folders.count("out/steps/bias-0.6-additive"));
+}
+
+TEST(Ablate, refuses_what_would_compare_a_step_with_itself) {
+  AblationOptions options;
+  options.weights = {0};
+  EXPECT_THROW(ablation_steps({}, options, "out"), Error);
+  options.weights = {1, 1};
+  EXPECT_THROW(ablation_steps({}, options, "out"), Error);
+  options.weights = {};
+  EXPECT_EQ(ablation_steps({}, options, "out").size(), 4u);
+  Config config;
+  config.detail.tile_scale = 0;
+  EXPECT_THROW(ablation_steps(config, options, "out"), Error);
+}
+
+TEST(Ablate, wrong_usage_is_named_and_leaves_nothing_behind) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "out";
+  const auto expect_refused = [&](int exit_code, const std::vector<std::string>& command,
+                                  const std::string& word) {
+    const test::ProcessResult result = test::run_process(command, {.seconds = 60});
+    EXPECT_EQ(result.exit_code, exit_code) << result.error;
+    EXPECT_NE(result.error.find(word), std::string::npos) << result.error;
+    EXPECT_FALSE(fs::exists(out)) << result.error;
+  };
+  expect_refused(2, ablate_command(out, {"--weights", "1.2,high"}), "--weights: expected a number");
+  expect_refused(2, ablate_command(out, {"--views", "4,5"}), "4, 9 or 16");
+  expect_refused(2, ablate_command(out, {"--resolution", "72"}), "multiple of 64");
+  std::vector<std::string> command = ablate_command(out);
+  command[2] = "no-such.glb";
+  expect_refused(1, command, "no-such.glb");
+  expect_refused(2, {test::built_program("patina").string(), "ablate", "a.glb", "-o", out.string()},
+                 "--prompt");
+}
+
+}  // namespace
+}  // namespace patina::pipeline
