@@ -31,8 +31,9 @@ struct NoiseOptions {
   int field_size = 1024;  // kPaper: M, texels of the field a side of the unit square of UV
   uint64_t seed = 0;
   int subpixels = 4;  // kPaper: point samples a side of a latent pixel, 1 to 64
-  float points_per_latent =
-      48.0f;  // kExact: points of the field in a latent pixel of median footprint; docs/noise.md
+  // kExact: points of the field in a latent pixel of median footprint; docs/noise.md has what more or fewer
+  // do
+  float points_per_latent = 48.0f;
 };
 
 /// cameras: grid × grid views; latent_scale: image pixels a latent pixel (8 for Stable Diffusion). Each
