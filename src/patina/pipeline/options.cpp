@@ -161,14 +161,15 @@ Option views_option() {
 }
 
 Option exposure_option() {
-  Option option{
-      .name = "exposure",
-      .aliases = {},
-      .group = "Views",
-      .placeholder = "auto|EV",
-      .help = "Exposure of all views, in stops; auto brings the object's mean luminance to middle grey.",
-      .default_text = "auto",
-      .stages = kRenderStage};
+  Option option{.name = "exposure",
+                .aliases = {},
+                .group = "Views",
+                .placeholder = "auto|EV",
+                .help =
+                    "Exposure of all views, in stops; auto meters the light that falls on the asset, so that "
+                    "white comes out white.",
+                .default_text = "auto",
+                .stages = kRenderStage};
   const Option named = option;
   option.set = [named](Config& c, Values v) {
     if (v.front() == "auto")
