@@ -70,17 +70,30 @@ json to_json(const AssetRow& row) {
           {"seconds_consistency_9x512", row.seconds_consistency}};
 }
 
-// What all assets say together: extremes, and means over assets that count alike.
+// Over assets, which count alike; one whose views share no surface has no share of the bound.
+struct MeanShare {
+  double sum = 0;
+  int count = 0;
+  void add(const ShareOfBound& share) {
+    if (share.num_pairs > 0) sum += share.value, ++count;
+  }
+  double value() const { return count > 0 ? sum / count : 0; }
+};
+
+// What all assets say together.
 struct Summary {
   Whiteness whiteness;
-  double exact = 0, paper = 0, exact_close = 0, paper_close = 0, largest_deviation = 0;
+  MeanShare exact, paper, exact_close, paper_close;
+  double largest_deviation = 0;
   int num_assets = 0, num_left_out = 0;
   double seconds_9x512 = 0, seconds_16x1024 = 0, seconds_consistency = 0;
 
   void add(const AssetRow& row) {
     whiteness.add(row.whiteness);
-    exact += row.exact.value, paper += row.paper.value;
-    exact_close += row.exact_close.value, paper_close += row.paper_close.value;
+    exact.add(row.exact);
+    paper.add(row.paper);
+    exact_close.add(row.exact_close);
+    paper_close.add(row.paper_close);
     largest_deviation = std::max(largest_deviation, row.exact.deviation);
     seconds_9x512 = std::max(seconds_9x512, row.seconds_noise + row.seconds_correspondences);
     seconds_16x1024 = std::max(seconds_16x1024, row.seconds_16x1024);
@@ -89,10 +102,9 @@ struct Summary {
   }
 
   json to_json(int num_seeds) const {
-    const auto n = static_cast<double>(std::max(num_assets, 1));
     const double numbers = 4.0 * 64 * 64 * num_seeds;  // of one view over all seeds
-    return {{"exact_of_bound", exact / n},
-            {"paper_of_bound", paper / n},
+    return {{"exact_of_bound", exact.value()},
+            {"paper_of_bound", paper.value()},
             {"max_autocorrelation", whiteness.max_autocorrelation},
             {"variance_range", pair_of(whiteness.variance)},
             {"seconds_9x512", seconds_9x512},
@@ -114,8 +126,8 @@ struct Summary {
               // That the smallest of so many independent p-values is as small.
               {"ks_p_of_smallest",
                1.0 - std::pow(1.0 - whiteness.smallest_ks_p, static_cast<double>(whiteness.ks_tests))},
-              {"exact_of_bound_7deg", exact_close / n},
-              {"paper_of_bound_7deg", paper_close / n},
+              {"exact_of_bound_7deg", exact_close.value()},
+              {"paper_of_bound_7deg", paper_close.value()},
               {"seconds_16x1024", seconds_16x1024},
               {"seconds_consistency_9x512", seconds_consistency}}}};
   }

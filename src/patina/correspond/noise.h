@@ -31,8 +31,7 @@ struct NoiseOptions {
   int field_size = 1024;  // kPaper: M, texels of the field a side of the unit square of UV
   uint64_t seed = 0;
   int subpixels = 4;  // kPaper: point samples a side of a latent pixel, 1 to 64
-  // kExact: points of the field in a latent pixel of median footprint; docs/noise.md has what more or fewer
-  // do
+  // kExact: points of the field in a latent pixel of median footprint; docs/noise.md compares numbers.
   float points_per_latent = 48.0f;
 };
 
