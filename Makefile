@@ -9,7 +9,7 @@ DEMO_DIR := build/demo
 DEMO_MODEL ?= tests/data/tiny-sd
 DEMO_PROMPT ?= a rusty old kettle
 
-.PHONY: build check demo setup bench-programs bench-noise clean format tidy
+.PHONY: build check demo setup bench-programs bench-noise bench-attention clean format tidy
 
 setup:
 	@scripts/setup.sh
@@ -43,11 +43,10 @@ bench-noise: setup
 	@cmake --build build/release --parallel $(JOBS) --target bench_noise
 	build/release/bench_noise --out build/bench/noise.json
 
-bench-noise: bench-programs
-	build/release/bench_noise build/bench/noise.json
-
 # On the GPU too where there is one, with a Python whose torch sees it.
-bench-attention: bench-programs
+bench-attention: setup
+	@cmake --preset release -DPATINA_BUILD_BENCH=ON
+	@cmake --build build/release --parallel $(JOBS) --target bench_attention
 	OMP_WAIT_POLICY=passive build/release/bench_attention build/bench/attention.json
 	@if nvidia-smi > /dev/null 2>&1; then python3 bench/bench_attention_cuda.py --report build/bench/attention.json; \
 	else echo "No GPU here; where there is one:  python3 bench/bench_attention_cuda.py"; fi
