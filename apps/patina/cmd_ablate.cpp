@@ -11,6 +11,7 @@
 #include "patina/base/parallel.h"
 #include "patina/pipeline/ablate.h"
 #include "patina/pipeline/options.h"
+#include "point_cli.h"
 
 namespace patina::app {
 namespace {
@@ -89,6 +90,7 @@ void add_ablate(CLI::App& program) {
                  "Compare the edited views alone; without, each step is carried into textures too, which "
                  "takes longer.")
       ->group("Comparison");
+  const auto point = add_point_options(*command, "Comparison");
   const auto given =
       add_options(*command, ~0u, {"output", "run", "turntable", "views", "noise", "bias", "bias-scaling"});
   command->callback([=] {
@@ -102,6 +104,7 @@ void add_ablate(CLI::App& program) {
       throw Error(ErrorCode::kUsage, "--output", "say in which folder the comparison goes, e.g. -o ablation");
     pipeline::AblationOptions options;
     options.fit = !own->no_fit;
+    options.point = point->options();
     if (!own->weights.empty())
       options.weights =
           parsed("--weights", own->weights, "bias", [](const auto& c) { return c.detail.bias_weight; });

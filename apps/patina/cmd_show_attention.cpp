@@ -1,6 +1,4 @@
 // patina show-attention ASSET --prompt TEXT -o FILE: what one surface point attends to.
-#include <charconv>
-
 #include <fmt/format.h>
 
 #include "commands.h"
@@ -10,55 +8,27 @@
 #include "patina/base/parallel.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/show_attention.h"
+#include "point_cli.h"
 
 namespace patina::app {
-namespace {
-
-// "120,64".
-std::pair<int, int> parse_pixel(const std::string& text) {
-  std::pair<int, int> pixel;
-  const char* const end = text.data() + text.size();
-  const auto [comma, x_failure] = std::from_chars(text.data(), end, pixel.first);
-  if (x_failure == std::errc() && comma != end && *comma == ',') {
-    const auto [rest, y_failure] = std::from_chars(comma + 1, end, pixel.second);
-    if (y_failure == std::errc() && rest == end) return pixel;
-  }
-  throw Error(ErrorCode::kUsage, "--pixel",
-              fmt::format("expected two whole numbers as in 120,64, found '{}'", printable(text)));
-}
-
-}  // namespace
-
 void add_show_attention(CLI::App& program) {
   CLI::App* command = program.add_subcommand("show-attention",
                                              "Show what one surface point attends to in the U-Net, without "
                                              "and with the attention bias, over the view grid.");
   struct Own {
-    std::string asset, output, pixel, layer;
-    int view = 0, step = 0;
+    std::string asset, output, layer;
+    int step = 0;
   };
   const auto own = std::make_shared<Own>();
   command->add_option("ASSET", own->asset, "The asset: .glb, .gltf or .obj.")->required()->type_name("");
   command->add_option("-o,--output", own->output, "A page with the numbers (.html) or one picture (.png).")
       ->type_name("FILE")
       ->group("Input and output");
-  CLI::Option* const view =
-      command
-          ->add_option("--view", own->view,
-                       "View in which the point is picked, from 1 as the report counts. [1]")
-          ->type_name("N")
-          ->group("What is shown");
-  command
-      ->add_option(
-          "--pixel", own->pixel,
-          "The point: an image pixel of that view, from the top left. [where most views see the surface]")
-      ->type_name("X,Y")
-      ->group("What is shown");
+  const auto point = add_point_options(*command, "What is shown");
   command
       ->add_option("--layer", own->layer,
                    "Self-attention of the U-Net, e.g. up_blocks.2.attentions.0; `--layer list` names all. "
-                   "[the last of "
-                   "the finest]")
+                   "[the last of the finest]")
       ->type_name("NAME")
       ->group("What is shown");
   CLI::Option* const step =
@@ -79,8 +49,7 @@ void add_show_attention(CLI::App& program) {
     pipeline::check_attention_output(own->output);
     pipeline::AttentionOptions options;
     options.layer = own->layer;
-    if (!own->pixel.empty()) options.pixel = parse_pixel(own->pixel);
-    if (view->count() > 0) options.view = own->view - 1;
+    options.point = point->options();
     if (step->count() > 0 && own->step < 1)
       throw Error(ErrorCode::kUsage, "--step", fmt::format("expected 1 or more, found {}", own->step));
     options.evaluation = own->step;

@@ -128,20 +128,42 @@ TEST(Ablate, shows_every_step_with_the_numbers_of_its_run_folder) {
   EXPECT_NE(page.find("More views"), std::string::npos);
 }
 
-TEST(Ablate, renders_once_and_runs_nothing_twice) {
-  const TemporaryFolder folder;
-  const fs::path out = folder.path() / "out";
-  const std::vector<std::string> options{"--views", "4", "--weights", "1.2", "--no-fit"};
-  run_ok(ablate_command(out, options));
+// One ablation without a fit, which the tests share.
+class AblateEdits : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    seconds_ = test::run_process(ablate_command(whole(), kOptions), {.seconds = 300}).seconds;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static fs::path whole() { return folder_->path() / "whole"; }
+
+  inline static const std::vector<std::string> kOptions{"--views", "4", "--weights", "1.2", "--no-fit", "-q"};
+  inline static TemporaryFolder* folder_ = nullptr;
+  inline static double seconds_ = 0;
+};
+
+TEST_F(AblateEdits, a_killed_one_continues_and_gives_the_same_numbers) {
+  const fs::path broken = folder_->path() / "broken";
+  int num_kills = 0;
+  for (const double share : {0.5, 0.75}) {
+    const auto result = test::run_process(ablate_command(broken, kOptions), {.kill_after = share * seconds_});
+    num_kills += result.signal != 0;
+  }
+  EXPECT_GT(num_kills, 0);
+  run_ok(ablate_command(broken, kOptions));
+  EXPECT_EQ(without_cost(numbers_of(broken).at("steps")), without_cost(numbers_of(whole()).at("steps")));
+}
+
+TEST_F(AblateEdits, render_once_and_run_nothing_twice) {
+  const fs::path out = whole();
   const fs::path steps = out / "steps";
   std::set<std::string> renders, edits, render_seconds;
-  std::string stages;
   for (const auto& step : fs::directory_iterator(steps)) {
     renders.insert(hash_file(step.path() / "views" / "tile_00.png"));
     edits.insert(hash_file(step.path() / "detail" / "edited_00.png"));
     for (const json& stage : read_json(step.path() / "stages.json"))
       if (stage.at("name") == "render") render_seconds.insert(stage.at("seconds").dump());
-    stages += read_text_file(step.path() / "stages.json");
   }
   EXPECT_EQ(renders.size(), 1u);
   EXPECT_EQ(render_seconds.size(), 1u);  // one rendering that all steps took over
@@ -158,21 +180,6 @@ TEST(Ablate, renders_once_and_runs_nothing_twice) {
   EXPECT_EQ(after[5].at("name"), "bias-2.4");
   after.erase(5);
   EXPECT_EQ(after, before);
-}
-
-TEST(Ablate, a_killed_one_continues_and_gives_the_same_numbers) {
-  const TemporaryFolder folder;
-  const fs::path whole = folder.path() / "whole", broken = folder.path() / "broken";
-  const std::vector<std::string> options{"--views", "4", "--weights", "1.2", "--no-fit", "-q"};
-  const double seconds = test::run_process(ablate_command(whole, options), {.seconds = 300}).seconds;
-  int num_kills = 0;
-  for (const double share : {0.5, 0.75}) {
-    const auto result = test::run_process(ablate_command(broken, options), {.kill_after = share * seconds});
-    num_kills += result.signal != 0;
-  }
-  EXPECT_GT(num_kills, 0);
-  run_ok(ablate_command(broken, options));
-  EXPECT_EQ(without_cost(numbers_of(broken).at("steps")), without_cost(numbers_of(whole).at("steps")));
 }
 
 TEST(Ablate, every_step_changes_one_thing) {
@@ -232,6 +239,7 @@ TEST(Ablate, wrong_usage_is_named_and_leaves_nothing_behind) {
   expect_refused(2, ablate_command(out, {"--weights", "1.2,high"}), "--weights: expected a number");
   expect_refused(2, ablate_command(out, {"--views", "4,5"}), "4, 9 or 16");
   expect_refused(2, ablate_command(out, {"--resolution", "72"}), "multiple of 64");
+  expect_refused(2, ablate_command(out, {"--views", "4", "--pixel", "0,0"}), "does not show the asset");
   std::vector<std::string> command = ablate_command(out);
   command[2] = "no-such.glb";
   expect_refused(1, command, "no-such.glb");

@@ -72,8 +72,7 @@ TEST(ShowAttention, shows_the_layer_step_view_and_pixel_that_were_asked_for) {
   AttentionOptions options;
   options.layer = "down_blocks.1.attentions.0";
   options.evaluation = 2;
-  options.view = 2;
-  options.pixel = std::pair(33, 40);
+  options.point = {.view = 2, .pixel = std::pair(33, 40)};
   const ShownAttention shown = show_attention(config, options, run, {});
   EXPECT_EQ(shown.captured.evaluation, 2);
   EXPECT_EQ(shown.captured.bias_level, 1);
@@ -118,11 +117,11 @@ TEST(ShowAttention, wrong_requests_are_refused_with_what_would_do) {
   AttentionOptions options;
   options.layer = "list";
   expect(message(config, options), "16 × 16: down_blocks.0.attentions.0");
-  options = {.view = 4};
+  options = {.point = {.view = 4}};
   expect(message(config, options), "expected 1 to 4, found 5");
-  options = {.pixel = std::pair(64, 0)};
+  options = {.point = {.pixel = std::pair(64, 0)}};
   expect(message(config, options), "64 x 64 pixels");
-  options = {.pixel = std::pair(0, 0)};
+  options = {.point = {.pixel = std::pair(0, 0)}};
   expect(message(config, options), "does not show the asset");
   options = {.evaluation = 3};
   expect(message(config, options), "expected 1 to 2");

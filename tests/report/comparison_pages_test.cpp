@@ -59,7 +59,7 @@ TEST(AblationPage, shows_pictures_and_numbers_of_every_step) {
   expect_balanced(html);
   expect_self_contained(html);
   EXPECT_EQ(count(html, "<img "), 3u * (1 + 2 + 3));
-  for (const char* part : {"Baseline", "+ tile", "0.47", "17.2 dB", "134 %", "62.0 %", "24.5 dB",
+  for (const char* part : {"Baseline", "+ tile", "0.470", "17.2 dB", "134 %", "62.0 %", "24.5 dB",
                            "1 min 15 s", "6.54 GB", "812 MB", "a processor, 2 threads"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   EXPECT_EQ(html.find("More views"), std::string::npos);
@@ -67,8 +67,8 @@ TEST(AblationPage, shows_pictures_and_numbers_of_every_step) {
 
 TEST(AblationPage, marks_the_highest_of_a_column) {
   const std::string html = page_of(some_page(true));
-  EXPECT_NE(html.find("<td class=\"value\"><b>0.47</b></td>"), std::string::npos);
-  EXPECT_EQ(html.find("<b>0.21</b></td>"), std::string::npos);
+  EXPECT_NE(html.find("<td class=\"value\"><b>0.470</b></td>"), std::string::npos);
+  EXPECT_EQ(html.find("<b>0.210</b></td>"), std::string::npos);
 }
 
 TEST(AblationPage, without_a_fit_says_nothing_of_textures) {
@@ -155,7 +155,8 @@ TEST(AttentionPage, panels_mark_query_and_keys_and_brighten_what_the_bias_raises
     return panel.rgb(index % 8 * cell + cell / 2, index / 8 * cell + cell / 2);
   };
   for (const Image& panel : panels) {
-    EXPECT_GT(corner(panel, 9).y, 2 * corner(panel, 9).x);    // green
+    const vec3 beside_query = panel.rgb(9 % 8 * cell - 1, 9 / 8 * cell + cell / 2);
+    EXPECT_GT(beside_query.y, 2 * beside_query.x);            // green
     EXPECT_GT(corner(panel, 13).x, 2 * corner(panel, 13).y);  // red
   }
   // The two biased cells are one outline: none between them.

@@ -179,6 +179,19 @@ std::vector<AblationStep> steps_of_more_views(const AblationStep& last, const Ab
   return steps;
 }
 
+// Refuses an asset that cannot be used, and a point that is none, before folders are made and hours have
+// passed.
+void check_asset_and_point(const Config& config, const AblationOptions& options, const Progress& progress) {
+  const Workbench bench = open_workbench(config, progress);
+  views::ViewSet views{.grid = views::grid_of(bench.cameras.size()), .exposure_ev = 0, .views = {}};
+  for (const render::Camera& camera : bench.cameras)
+    views.views.push_back({.camera = camera,
+                           .gbuffer = views::make_gbuffer(*bench.scene, camera),
+                           .radiance = {},
+                           .coverage = {}});
+  pick_point(*bench.scene, views, options.point);
+}
+
 // Renders the views once and edits them in every run of `runs`, which differ in nothing that renders depend
 // on. Asset and G-buffers go when this returns, so that they do not count as another stage's memory.
 void edit(std::span<Run> runs, std::string_view told_as, size_t first, size_t count,
@@ -194,8 +207,9 @@ void edit(std::span<Run> runs, std::string_view told_as, size_t first, size_t co
 
 // Everything the page shows of the steps.
 report::AblationPage make_page(const Workbench& bench, const RenderedViews& views, std::span<const Run> runs,
-                               bool fit, const Config& config) {
-  const PickedPoint point = best_point(*bench.scene, views.set);
+                               const AblationOptions& options, const Config& config) {
+  const bool fit = options.fit;
+  const PickedPoint point = pick_point(*bench.scene, views.set, options.point);
   const std::vector<CropWindow> windows = crop_windows(point, views.set, kMaxCrops);
   const auto add_textures = [&](report::AblationRow& row, const std::vector<asset::MaterialMaps>& maps) {
     TexturePictures pictures = texture_pictures(*bench.scene, views.set, point, maps);
@@ -258,7 +272,7 @@ json ablate(const Config& config, const AblationOptions& options, const fs::path
   std::vector<Run> runs, more_runs;
   for (const AblationStep& step : steps) check_inputs(step.config);
   const Progress once = saying_once(progress);
-  open_workbench(steps[0].config, once);  // an asset that cannot be used is refused before folders are made
+  check_asset_and_point(steps[0].config, options, once);
   for (const AblationStep& step : steps) runs.push_back(open_run(step));
   for (const AblationStep& step : more_steps) more_runs.push_back(open_run(step));
 
@@ -281,7 +295,7 @@ json ablate(const Config& config, const AblationOptions& options, const fs::path
     report_stage(bench, views, edited, fitted, runs[i].step.config, *runs[i].folder, inner);
   }
 
-  report::AblationPage page = make_page(bench, views, runs, options.fit, config);
+  report::AblationPage page = make_page(bench, views, runs, options, config);
   json result = {{"patina", PATINA_VERSION},    {"asset", config.asset.string()}, {"options", page.config},
                  {"machine", page.machine},     {"views", bench.cameras.size()},  {"steps", json::array()},
                  {"view_counts", json::array()}};

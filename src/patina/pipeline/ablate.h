@@ -10,6 +10,7 @@
 
 #include "patina/base/progress.h"
 #include "patina/pipeline/config.h"
+#include "patina/pipeline/pick_point.h"
 
 namespace patina::pipeline {
 
@@ -19,7 +20,8 @@ struct AblationOptions {
   /// The steps are made with the first; time and memory of the last step are measured with all. Empty: with
   /// what the configuration says.
   std::vector<int> view_counts;
-  bool fit = true;  // carry every step into textures and measure those too
+  bool fit = true;     // carry every step into textures and measure those too
+  PointOptions point;  // that the crops show
 };
 
 /// One configuration of the comparison. `name` is its folder: "noise-exact", "bias-1.2", "bias-1.2-additive".

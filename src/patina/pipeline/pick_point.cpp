@@ -55,6 +55,11 @@ int PickedPoint::num_good_views() const {
       sights.begin(), sights.end(), [](const auto& sight) { return sight && sight->cosine >= kGoodCosine; }));
 }
 
+PickedPoint pick_point(const render::Scene& scene, const views::ViewSet& views, const PointOptions& options) {
+  if (!options.pixel) return best_point(scene, views, options.view);
+  return point_at(scene, views, options.view.value_or(0), options.pixel->first, options.pixel->second);
+}
+
 PickedPoint point_at(const render::Scene& scene, const views::ViewSet& views, int view, int x, int y) {
   check_view(views, view);
   const views::GBuffer& gbuffer = views.views[static_cast<size_t>(view)].gbuffer;

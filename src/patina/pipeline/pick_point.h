@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "patina/views/view_set.h"
@@ -25,6 +26,13 @@ struct PickedPoint {
 
   int num_good_views() const;
 };
+
+/// How a user names a point; nothing at all: best_point.
+struct PointOptions {
+  std::optional<int> view = {};                   // counted from 0
+  std::optional<std::pair<int, int>> pixel = {};  // x, y of an image pixel of that view, or of the first
+};
+PickedPoint pick_point(const render::Scene& scene, const views::ViewSet& views, const PointOptions& options);
 
 /// The surface point that view `view` shows at the centre of pixel (x, y). Throws Error{kUsage} where that is
 /// none of the asset's, or outside of the picture.

@@ -7,7 +7,6 @@
 #include "patina/base/error.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/enhance.h"
-#include "patina/pipeline/pick_point.h"
 #include "patina/report/html.h"
 #include "patina/report/report.h"
 
@@ -46,10 +45,7 @@ ShownAttention show_attention(const Config& config, const AttentionOptions& opti
       diffusion::self_attention_layers(model, grid * camera.width, grid * camera.height), options.layer);
 
   const RenderedViews views = render_stage(bench, config, run, progress);
-  const PickedPoint point = options.pixel ? point_at(*bench.scene, views.set, options.view.value_or(0),
-                                                     options.pixel->first, options.pixel->second)
-                                          : best_point(*bench.scene, views.set, options.view);
-
+  const PickedPoint point = pick_point(*bench.scene, views.set, options.point);
   const PreparedDetail prepared = prepare_detail(bench, views, config, model, progress);
   diffusion::DetailOptions detail = config.detail;
   detail.seed = config.seed;

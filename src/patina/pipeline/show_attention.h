@@ -2,24 +2,21 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
-#include <utility>
 
 #include "patina/base/progress.h"
 #include "patina/diffusion/attention_probe.h"
 #include "patina/pipeline/config.h"
+#include "patina/pipeline/pick_point.h"
 #include "patina/pipeline/run_folder.h"
 #include "patina/report/attention_page.h"
 
 namespace patina::pipeline {
 
 struct AttentionOptions {
-  std::optional<int> view = {};                   // counted from 0
-  std::optional<std::pair<int, int>> pixel = {};  // x, y of an image pixel of that view (or of the first);
-                                                  // nullopt: where most views see the surface
-  std::string layer = {};                         // as find_layer takes it
-  int evaluation = 0;                             // of the network, from 1; 0: the middle one
+  PointOptions point = {};
+  std::string layer = {};  // as find_layer takes it
+  int evaluation = 0;      // of the network, from 1; 0: the middle one
 };
 
 struct ShownAttention {

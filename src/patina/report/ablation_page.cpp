@@ -40,6 +40,9 @@ body { max-width:88rem; }
 std::string with_unit(double value, const char* unit) {
   return std::isnan(value) ? "–" : number(value) + unit;
 }
+std::string correlation(double value) {
+  return std::isnan(value) ? "–" : fmt::format("{:.3f}", value);
+}
 std::string percent(double share) {
   return std::isnan(share) ? "–" : number(100 * share) + " %";
 }
@@ -72,7 +75,7 @@ std::string figure_row(const AblationPage& page, const AblationRow& row, bool is
                   escaped(row.title, 200), escaped(row.note, 300));
   if (is_step)
     html +=
-        fmt::format("<b>{}</b><small>edit correlation</small>", with_unit(row.measures.edit_correlation, ""));
+        fmt::format("<b>{}</b><small>edit correlation</small>", correlation(row.measures.edit_correlation));
   html += "</div>\n" + picture(row.views, kGridSide, row.title + ": all views") + "\n<div class=\"crops\">\n";
   for (size_t i = 0; i < row.crops.size(); ++i)
     html += captioned(row.crops[i], fmt::format("{}: crop {}", row.title, i + 1),
@@ -99,9 +102,6 @@ struct Column {
   bool has_bar = false;
 };
 
-std::string plain(double value) {
-  return with_unit(value, "");
-}
 std::string decibel(double value) {
   return with_unit(value, " dB");
 }
@@ -133,7 +133,7 @@ std::string table(const std::vector<AblationRow>& steps, const std::vector<Colum
 
 std::string quality_table(const AblationPage& page) {
   using M = AblationMeasures;
-  std::vector<Column> columns{{"Edit correlation", &M::edit_correlation, plain, true, true},
+  std::vector<Column> columns{{"Edit correlation", &M::edit_correlation, correlation, true, true},
                               {"Edit PSNR", &M::edit_psnr, decibel, true},
                               {"Detail of the edit over the renders", &M::edit_sharpness, percent}};
   if (fitted(page)) {

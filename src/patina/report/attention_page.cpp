@@ -109,12 +109,14 @@ std::vector<Image> attention_panels(const AttentionFigure& figure) {
   const int cell_pixels = std::max(2, (kPanelSide + figure.cells.columns - 1) / figure.cells.columns);
   const Image views =
       scaled_srgb(figure.views, cell_pixels * figure.cells.columns, cell_pixels * figure.cells.rows);
-  const int thickness = std::clamp(cell_pixels / 8, 1, 4);
-  const int32_t query[] = {figure.query};
+  // Lines as wide as fits a small cell; the query's frame lies around its cell, so that it is found.
+  const int thickness = std::clamp(cell_pixels / 4, 1, 4), frame = std::max(3, thickness);
+  const int left = figure.query % figure.cells.columns * cell_pixels - frame,
+            top = figure.query / figure.cells.columns * cell_pixels - frame, side = cell_pixels + 2 * frame;
   const auto marked = [&](Image picture) {
     picture = with_outline(std::move(picture), figure.cells, figure.biased_keys, kKeyColor, thickness);
-    picture = with_outline(std::move(picture), figure.cells, query, kQueryColor, std::max(2, thickness));
-    return with_borders(std::move(picture), figure.grid);
+    picture = with_borders(std::move(picture), figure.grid);
+    return with_frame(std::move(picture), left, top, side, side, kQueryColor, frame);
   };
   const float brightest = brightest_attention(figure);
   return {marked(views), marked(heat_overlay(views, figure.cells, figure.without, brightest)),
