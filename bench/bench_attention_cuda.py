@@ -30,6 +30,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 EXIT_NO_DEVICE = 3
 BETA = 1.8
+DEVICE = "cuda"
 
 SOURCES = [
     "bench/bench_attention_cuda.cpp",
@@ -190,12 +191,12 @@ def rehearse(arguments):
             error = relative_error(found, exact_rows(q, k, v, scale, mask, BETA, rows)[0])
             print(f"head_dim {dim:3d} f32: FlexAttention off by {error:.1e}")
             checks.expect(error < 1e-5, f"FlexAttention, {dim}")
-    entries = {"d40": {"36864": 1.0}}
+    entries = {"40": {"36864": 1.0}}
     scratch = arguments.build_dir / "rehearsal.json"
-    scratch.write_text(json.dumps({"matrix_peak_gflops": 1, "flex_over_biased": {"d40": {"1": 2.0}}}))
+    scratch.write_text(json.dumps({"matrix_peak_gflops": 1, "flex_over_biased": {"40": {"1": 2.0}}}))
     merge_report(scratch, {"flex_over_biased": entries})
     checks.expect(json.loads(scratch.read_text()) == {"matrix_peak_gflops": 1,
-                                                      "flex_over_biased": {"d40": {"1": 2.0, "36864": 1.0}}},
+                                                      "flex_over_biased": {"40": {"1": 2.0, "36864": 1.0}}},
                   "merging the report")
     print("rehearsal " + ("failed" if checks.failed else "passed: nothing was measured, nothing reported"))
     return 1 if checks.failed else 0
@@ -216,12 +217,13 @@ def check_on_device(arguments, checks):
         for dim, side, view, radius, beta in cases:
             grid = flex.Grid(side, view, radius)
             table = flex.landings(grid)
-            bias, rows = make_bias(grid, table), torch.arange(grid.pixels, device="cuda")
-            mask = flex.biased_mask(grid, table.cuda(), rows)
+            bias, rows = make_bias(grid, table), torch.arange(grid.pixels, device=DEVICE)
+            mask = flex.biased_mask(grid, table.to(DEVICE), rows)
             scale, heads = 1 / math.sqrt(dim), 3
-            q, k, v = random_heads(2, heads, grid.pixels, dim, dtype, "cuda", dim)
+            q, k, v = random_heads(2, heads, grid.pixels, dim, dtype, DEVICE, dim)
             found = ops.attend(*map(merge_heads, (q, k, v)), heads, bias, beta)
             exact, exact_sum = exact_rows(q, k, v, scale, mask, beta, rows)
+            plain_sum = exact_rows(q, k, v, scale, mask, 0, rows)[1]
             error = relative_error(found, merge_heads(exact))
             worst[name] = max(worst[name], error) if error == error else error
             # For beta < 0 the dense result's rounding grows by up to e^-beta.
@@ -231,7 +233,6 @@ def check_on_device(arguments, checks):
                 if not ops.takes(kernel, q):
                     continue
                 out, log_sum_exp = ops.dense(kernel, q, k, v, scale)
-                plain_sum = exact_rows(q, k, v, scale, mask, 0, rows)[1]
                 off = (log_sum_exp - plain_sum).abs().max().item()
                 checks.expect(off < 2e-3, f"log-sum-exp of {kernel}, head_dim {dim} {name}: off by {off:.1e}")
                 ops.add_bias(out, log_sum_exp, q, k, v, scale, bias, beta)
@@ -244,7 +245,7 @@ def check_on_device(arguments, checks):
     # beta 0 is bit-equal to no bias; slices of a fused projection give what copies give; runs repeat.
     grid = flex.Grid(3, 20)
     bias, n = make_bias(grid, flex.landings(grid)), grid.pixels
-    fused = torch.randn(2, n, 3 * 320, device="cuda", dtype=torch.bfloat16)
+    fused = torch.randn(2, n, 3 * 320, device=DEVICE, dtype=torch.bfloat16)
     q, k, v = fused.chunk(3, -1)
     checks.expect(torch.equal(ops.attend(q, k, v, 8, bias, 0.0), ops.attend(q, k, v, 8, None, 0.0)),
                   "beta 0 is not bit-equal to no bias")
@@ -252,7 +253,7 @@ def check_on_device(arguments, checks):
     checks.expect(torch.equal(found, ops.attend(q, k, v, 8, bias, BETA)), "two runs differ")
     copies = ops.attend(q.contiguous(), k.contiguous(), v.contiguous(), 8, bias, BETA)
     checks.expect((found - copies).abs().max().item() < 1e-2, "slices of a fused projection differ from copies")
-    odd = torch.randn(2, n, 3 * 320 + 4, device="cuda", dtype=torch.bfloat16)  # rows not on 16 bytes
+    odd = torch.randn(2, n, 3 * 320 + 4, device=DEVICE, dtype=torch.bfloat16)  # rows not on 16 bytes
     odd[..., 4:] = fused
     again = ops.attend(*odd[..., 4:].chunk(3, -1), 8, bias, BETA)
     checks.expect((found - again).abs().max().item() < 1e-2, "tensors off 16 bytes differ from copies")
@@ -299,9 +300,9 @@ def measure_shape(arguments, checks, side, view, dim):
     grid = flex.Grid(side, view)
     table = flex.landings(grid)
     bias = make_bias(grid, table)
-    table = table.cuda()
+    table = table.to(DEVICE)
     scale, heads, n = 1 / math.sqrt(dim), arguments.heads, grid.pixels
-    q, k, v = random_heads(arguments.batch, heads, n, dim, dtype, "cuda", dim)
+    q, k, v = random_heads(arguments.batch, heads, n, dim, dtype, DEVICE, dim)
     flat = [merge_heads(t) for t in (q, k, v)]
 
     contestants = {}
@@ -330,7 +331,7 @@ def measure_shape(arguments, checks, side, view, dim):
             checks.expect(name != "biased" and name != "flex", f"{name} at {n} tokens, head_dim {dim} does not run")
             print(f"  {name} does not run at {n} tokens, head_dim {dim}: {str(error).splitlines()[0][:160]}")
             del contestants[name]
-    rows = torch.randint(n, (64,), device="cuda")
+    rows = torch.randint(n, (64,), device=DEVICE)
     exact = exact_rows(q, k, v, scale, flex.biased_mask(grid, table, rows), BETA, rows)[0]
     biased = results["biased"].unflatten(2, (heads, dim)).transpose(1, 2)
     errors = {"biased": relative_error(biased[:, :, rows], exact)}
@@ -406,10 +407,10 @@ def run(arguments):
         for dim in arguments.head_dims:
             entry = measure_shape(arguments, checks, side, view, dim)
             tokens = str((side * view) ** 2)
-            shapes[f"d{dim} {tokens}"] = entry
+            shapes[f"head_dim {dim}, {tokens} tokens"] = entry
             for key, by_dim in ratios.items():
                 if key in entry:
-                    by_dim.setdefault(f"d{dim}", {})[tokens] = round(entry[key], 4)
+                    by_dim.setdefault(str(dim), {})[tokens] = round(entry[key], 4)
             # After every shape, so that a run that is cut short leaves what it has.
             merge_report(arguments.report, ratios | {"cuda": {
                 "device": name, "torch": torch.__version__, "cudnn": torch.backends.cudnn.version(),
@@ -420,7 +421,7 @@ def run(arguments):
         for dim, by_tokens in ratios[key].items():
             for tokens, value in by_tokens.items():
                 if (value > aim) == over and value != aim:
-                    print(f"  {key} of {dim} at {tokens} tokens is {value:.3f}; the aim is {'<=' if over else '>='} {aim}")
+                    print(f"  {key} of head_dim {dim} at {tokens} tokens is {value:.3f}; the aim is {'<=' if over else '>='} {aim}")
     if checks.failed:
         fail(f"{checks.failed} checks failed", 1)
     return 0

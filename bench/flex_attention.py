@@ -96,18 +96,20 @@ class FlexBias:
             return torch.where(near, score + beta, score)
 
         self._score_mod = add_bias
+        # Past some recompilations of one function, torch.compile would run it uncompiled, with all scores in memory.
+        torch.compiler.reset()
         self._compiled = torch.compile(flex_attention, dynamic=False)
-        self._padded = False  # head dimensions that FlexAttention refuses are padded to a power of two
+        self._padded = False  # a head dimension that FlexAttention refuses is padded to a power of two
 
     def __call__(self, q, k, v, scale: float):
+        dim = q.shape[-1]
         if not self._padded:
             try:
                 return self._compiled(q, k, v, score_mod=self._score_mod, scale=scale)
-            except Exception as refused:  # torch.compile wraps what the template says in types of its own
-                if q.shape[-1] & (q.shape[-1] - 1) == 0 or "power of" not in str(refused).lower():
+            except Exception:  # torch.compile wraps what the kernel's template says in types of its own
+                if dim & (dim - 1) == 0:
                     raise
                 self._padded = True
-        dim = q.shape[-1]
         pad = (0, (1 << (dim - 1).bit_length()) - dim)
         q, k, v = (torch.nn.functional.pad(t, pad) for t in (q, k, v))
         return self._compiled(q, k, v, score_mod=self._score_mod, scale=scale)[..., :dim]
