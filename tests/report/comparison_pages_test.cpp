@@ -60,7 +60,7 @@ TEST(AblationPage, shows_pictures_and_numbers_of_every_step) {
   expect_self_contained(html);
   EXPECT_EQ(count(html, "<img "), 3u * (1 + 2 + 3));
   for (const char* part : {"Baseline", "+ tile", "0.470", "17.2 dB", "134 %", "62.0 %", "24.5 dB",
-                           "1 min 15 s", "6.54 GB", "812 MB", "a processor, 2 threads"})
+                           "1 min 15 s", "6.39 GB", "812 MB", "a processor, 2 threads"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   EXPECT_EQ(html.find("More views"), std::string::npos);
 }
@@ -93,7 +93,7 @@ TEST(AblationPage, has_a_row_for_every_number_of_views) {
   page.view_counts = {{4, 512, 16384, 0.1, 0.3, 61, 4321}, {9, 512, 36864, 0.2, 0.7, 200, 5678}};
   const std::string html = page_of(page);
   expect_balanced(html);
-  for (const char* part : {"16384", "36864", "3 min 20 s", "5.68 GB", "+ attention bias, w = 1"})
+  for (const char* part : {"16384", "36864", "3 min 20 s", "5.54 GB", "+ attention bias, w = 1"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
 }
 

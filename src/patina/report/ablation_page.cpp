@@ -53,7 +53,7 @@ std::string seconds(double value) {
 }
 std::string memory(double megabytes) {
   if (std::isnan(megabytes)) return "–";
-  return megabytes < 1000 ? fmt::format("{:.0f} MB", megabytes) : fmt::format("{:.2f} GB", megabytes / 1000);
+  return megabytes < 1000 ? fmt::format("{:.0f} MB", megabytes) : fmt::format("{:.2f} GB", megabytes / 1024);
 }
 
 bool fitted(const AblationPage& page) {
@@ -119,7 +119,9 @@ std::string table(const std::vector<AblationRow>& steps, const std::vector<Colum
       const double value = row.measures.*column.measure;
       double highest = -std::numeric_limits<double>::infinity();
       for (const AblationRow& other : steps) highest = std::fmax(highest, other.measures.*column.measure);
-      const bool is_best = column.highest_is_best && value == highest && steps.size() > 1;
+      // What reads the same is as good.
+      const bool is_best = column.highest_is_best && !std::isnan(value) && steps.size() > 1 &&
+                           column.show(value) == column.show(highest);
       html += fmt::format("<td class=\"value\">{0}{1}{2}</td>", is_best ? "<b>" : "", column.show(value),
                           is_best ? "</b>" : "");
       if (column.has_bar)
@@ -135,7 +137,7 @@ std::string quality_table(const AblationPage& page) {
   using M = AblationMeasures;
   std::vector<Column> columns{{"Edit correlation", &M::edit_correlation, correlation, true, true},
                               {"Edit PSNR", &M::edit_psnr, decibel, true},
-                              {"Detail of the edit over the renders", &M::edit_sharpness, percent}};
+                              {"Detail of the edited views over the renders", &M::edit_sharpness, percent}};
   if (fitted(page)) {
     columns.push_back({"Sharpness the textures kept", &M::texture_sharpness, percent});
     columns.push_back({"Textures reproduce the edit", &M::texture_psnr, decibel, true});
