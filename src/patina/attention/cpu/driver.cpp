@@ -13,7 +13,7 @@
 
 #include "patina/attention/bf16.h"
 #include "patina/attention/cpu/kernel.h"
-#include "patina/attention/cpu/query_blocks.h"
+#include "patina/attention/query_blocks.h"
 #include "patina/base/parallel.h"
 
 namespace patina::attention {
