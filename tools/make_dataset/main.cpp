@@ -1,0 +1,100 @@
+// make_dataset: makes the data that patina-mini is trained on. See docs/dataset.md.
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "materials.h"
+#include "objects.h"
+#include "pack.h"
+#include "preview.h"
+
+namespace {
+
+using namespace patina;
+namespace fs = std::filesystem;
+
+constexpr const char* kUsage =
+    "usage: make_dataset objects --shared SHARED --count N WORK      bake N objects of four views (resumable)\n"
+    "       make_dataset materials --shared SHARED [--limit N] WORK  pack photographed materials\n"
+    "       make_dataset pack WORK SHARDS                            gather both into a few shards\n"
+    "       make_dataset preview SHARDS -o SHEET.png [--seed N] [--rows N] [--width N]\n"
+    "                    [--only NAME] [--held-out]                  look at samples; captions in SHEET.png.txt\n";
+
+struct Arguments {
+  std::vector<std::string> positional;
+  fs::path shared, output;
+  std::string only;
+  int count = 80, limit = 10, rows = 8, width = 160;
+  uint64_t seed = 0;
+  bool held_out = false, good = true;
+};
+
+Arguments parsed(int argc, char** argv) {
+  Arguments out;
+  for (int i = 2; i < argc; ++i) {
+    const std::string word = argv[i];
+    const auto value = [&]() -> std::string {
+      if (i + 1 < argc) return argv[++i];
+      out.good = false;
+      return "0";
+    };
+    if (word == "--shared") out.shared = value();
+    else if (word == "-o") out.output = value();
+    else if (word == "--count") out.count = std::stoi(value());
+    else if (word == "--limit") out.limit = std::stoi(value());
+    else if (word == "--rows") out.rows = std::stoi(value());
+    else if (word == "--width") out.width = std::stoi(value());
+    else if (word == "--only") out.only = value();
+    else if (word == "--seed") out.seed = std::stoull(value());
+    else if (word == "--held-out") out.held_out = true;
+    else if (word.rfind("-", 0) == 0) out.good = false;
+    else out.positional.push_back(word);
+  }
+  return out;
+}
+
+// One line that says how far a job is and how long the rest may take.
+Progress console() {
+  Progress progress;
+  const auto start = std::chrono::steady_clock::now();
+  progress.on_update = [start](std::string_view task, double done, double total) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double left = done > 0 ? seconds * (total - done) / done : 0;
+    std::fprintf(stderr, "\r%.*s %.0f of %.0f, %.0f s gone, about %.0f s left   %s", static_cast<int>(task.size()), task.data(),
+                 done, total, seconds, left, done >= total ? "\n" : "");
+  };
+  progress.on_warning = [](std::string_view text) {
+    std::fprintf(stderr, "\nwarning: %.*s\n", static_cast<int>(text.size()), text.data());
+  };
+  return progress;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace patina::make_dataset;
+  try {
+    const std::string command = argc > 1 ? argv[1] : "";
+    const Arguments a = parsed(argc, argv);
+    const auto has = [&](size_t n) { return a.good && a.positional.size() == n; };
+    if (command == "objects" && has(1)) {
+      bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects", console());
+    } else if (command == "materials" && has(1) && !a.shared.empty()) {
+      const auto entries = material_entries(a.shared / "materials", a.limit, console());
+      mini_data::write_shard(fs::path(a.positional[0]) / "materials.shard", entries);
+    } else if (command == "pack" && has(2)) {
+      std::fputs(pack(a.positional[0], a.positional[1]).c_str(), stdout);
+    } else if (command == "preview" && has(1) && !a.output.empty()) {
+      write_preview(a.positional[0], a.output, {a.seed, a.rows, a.held_out, a.only, a.width});
+    } else {
+      std::fputs(kUsage, stderr);
+      return 2;
+    }
+    return 0;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "\nmake_dataset: %s\n", e.what());
+    return 1;
+  }
+}

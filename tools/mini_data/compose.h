@@ -1,0 +1,35 @@
+// Training samples out of the data: materials laid over baked views, aged as plans say, and lit, all as batched
+// tensor operations on any device.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ATen/core/Tensor.h>
+#include <c10/core/Device.h>
+
+#include "mini_data/plan.h"
+
+namespace patina::mini_data {
+
+/// A data set's tensors on one device: about 1.7 MB a view, 0.5 MB a material.
+struct Library;
+std::shared_ptr<const Library> make_library(const Dataset& dataset, c10::Device device);
+
+/// B = number of plans × views a plan; samples of one plan follow each other. f32 on the library's device.
+struct Batch {
+  at::Tensor tile;      // [B,3,H,W] sRGB [0,1]: the clean render over the neutral backdrop, as views::tile_control
+  at::Tensor normal;    // [B,3,H,W] [0,1], as views::normal_control
+  at::Tensor target;    // [B,3,H,W] sRGB [0,1]: the aged render, same light and exposure
+  at::Tensor coverage;  // [B,1,H,W]
+  at::Tensor age_mask;  // [B,1,H,W] how much of the surface's colour the layers made up, [0,1]
+  std::vector<std::string> captions;  // [B]
+  std::vector<float> exposure_ev;     // [plans], in units of the object's mean light
+};
+
+/// Carries out plans that all have the same number of views. H = W = kViewSide. No gradients are recorded.
+Batch compose(const Library& library, std::span<const Plan> plans);
+
+}  // namespace patina::mini_data
