@@ -19,8 +19,8 @@ std::vector<AttentionLayer> self_attention_layers(const Model& model, int width,
 /// The name as people say it: without ".transformer_blocks.0.attn1" where that is its end.
 std::string short_name(const AttentionLayer& layer);
 
-/// The layer of that name, short or whole. Empty: the last of the finest
-/// resolution, where the bias acts on the finest detail. Throws Error{kUsage} that lists all.
+/// The layer of that name, short or whole. Empty: the last of the finest resolution, where the bias acts on
+/// the finest detail. Throws Error{kUsage} that lists all.
 AttentionLayer find_layer(const std::vector<AttentionLayer>& layers, std::string_view name);
 
 struct CapturedAttention {

@@ -34,7 +34,8 @@ struct DetailRun {
 };
 
 /// Checks inputs and options, encodes text, conditions and start images, and adds the noise of the first
-/// step, or takes the state of `resume`. Throws Error{kUsage} if sizes do not fit.
+/// step, or takes the state of `resume`. The caller holds a c10::InferenceMode. Throws Error{kUsage} if sizes
+/// do not fit.
 std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& inputs,
                                         const DetailOptions& options, const std::optional<Checkpoint>& resume,
                                         const Progress& progress);

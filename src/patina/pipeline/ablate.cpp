@@ -64,7 +64,8 @@ Progress of_all_steps(const Progress& progress, std::string_view task, size_t in
 void measure_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
                    Run& run, const Progress& progress) {
   std::string key = bench.scene_hash + cameras_to_json(bench.cameras).dump() + PATINA_VERSION +
-                    fmt::format("{}", run.step.config.fit.boundary_pixels);
+                    fmt::format("{}", run.step.config.fit.boundary_pixels) +
+                    json(run.step.config.materials).dump();
   for (const std::span<const Image> images : {std::span<const Image>(views.tile), edited})
     for (const Image& image : images)
       key += hash_bytes(
