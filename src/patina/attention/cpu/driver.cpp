@@ -13,6 +13,7 @@
 
 #include "patina/attention/bf16.h"
 #include "patina/attention/cpu/kernel.h"
+#include "patina/attention/cpu/transpose.h"
 #include "patina/attention/query_blocks.h"
 #include "patina/base/parallel.h"
 
@@ -126,8 +127,7 @@ bool pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& si
       const int64_t count = std::clamp<int64_t>(end - j0, 0, 32);
       if (count < 32) std::memset(to, 0, static_cast<size_t>(value_dim) * 64);
       const uint16_t* rows = v_in + j0 * a.v_strides.token;
-      for (int64_t d = 0; d < dim; ++d)
-        for (int64_t j = 0; j < count; ++j) to[d * 32 + j] = rows[j * a.v_strides.token + d];
+      transpose(rows, a.v_strides.token, count, dim, to, 32);
       std::fill(to + dim * 32, to + dim * 32 + count, bf16_of_float(1.0f));
       std::fill(to + dim * 32 + count, to + dim * 32 + 32, uint16_t{0});
       std::memset(to + (dim + 1) * 32, 0, static_cast<size_t>(value_dim - dim - 1) * 64);
@@ -142,10 +142,11 @@ bool pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& si
   return moderate;
 }
 
-/// Returns the lanes that are not moderate (kBf16Tiles).
+/// pairs: room for kBlockQueries rows of head_dim, bf16. Returns the lanes that are not moderate
+/// (kBf16Tiles).
 uint64_t pack_queries(const Arguments& a, Packing packing, const PackedSizes& sizes, int64_t q_base,
-                      const QueryBlock& block, float scale, void* q_out) {
-  const int64_t dim = a.shape.head_dim;
+                      const QueryBlock& block, float scale, uint32_t* pairs, void* q_out) {
+  const int64_t dim = a.shape.head_dim, num_pairs = (dim + 1) / 2;
   std::memset(q_out, 0, static_cast<size_t>(sizes.q_bytes));
   uint64_t immoderate = 0;
   for (int lane = 0; lane < block.num_lanes(); ++lane) {
@@ -161,16 +162,18 @@ uint64_t pack_queries(const Arguments& a, Packing packing, const PackedSizes& si
       continue;
     }
     const uint16_t* row = static_cast<const uint16_t*>(a.q) + offset;
-    if (packing == Packing::kBf16Pairs) {
-      uint16_t* q = static_cast<uint16_t*>(q_out) + 2 * lane;
-      for (int64_t d = 0; d < dim; ++d) q[d / 2 * 2 * kBlockQueries + d % 2] = row[d];
-    } else {
-      uint16_t* q = static_cast<uint16_t*>(q_out) + lane / 16 * 16 * sizes.dim + lane % 16 * 2;
-      for (int64_t d = 0; d + 2 <= dim; d += 2) std::memcpy(q + d * 16, row + d, 4);
-      if (dim % 2) q[dim / 2 * 32] = row[dim - 1];
-      if (!all_moderate(row, dim)) immoderate |= uint64_t{1} << lane;
-    }
+    pairs[(lane + 1) * num_pairs - 1] = 0;
+    std::memcpy(pairs + lane * num_pairs, row, static_cast<size_t>(dim) * 2);
+    if (packing == Packing::kBf16Tiles && !all_moderate(row, dim)) immoderate |= uint64_t{1} << lane;
   }
+  if (packing == Packing::kF32) return 0;
+  const int64_t num_lanes = block.num_lanes();
+  // Pairs of dimensions are 32-bit elements: [lanes][pairs] -> [pairs][lanes], in one piece or 16 lanes a
+  // tile.
+  const int64_t lanes_a_piece = packing == Packing::kBf16Tiles ? 16 : kBlockQueries;
+  for (int64_t lane = 0; lane < num_lanes; lane += lanes_a_piece)
+    transpose(pairs + lane * num_pairs, num_pairs, std::min(lanes_a_piece, num_lanes - lane), num_pairs,
+              static_cast<uint32_t*>(q_out) + lane * sizes.dim / 2, lanes_a_piece);
   return immoderate;
 }
 
@@ -178,16 +181,18 @@ uint64_t pack_queries(const Arguments& a, Packing packing, const PackedSizes& si
 void write_rows(const Arguments& a, int64_t out_base, const QueryBlock& block, const float* rows,
                 uint16_t* bf16) {
   const int64_t dim = a.shape.head_dim;
-  if (a.element == Element::kBf16)
+  if (a.element == Element::kBf16) {
     for (int64_t i = 0; i < dim * kBlockQueries; ++i) bf16[i] = bf16_of_float(rows[i]);
+    // Lanes of one run of queries are as far apart as tokens.
+    for (int lane = 0; lane < block.num_lanes(); lane += block.row_length)
+      transpose(bf16 + lane, kBlockQueries, dim, block.row_length,
+                static_cast<uint16_t*>(a.out) + out_base + block.query(lane) * a.out_strides.token,
+                a.out_strides.token);
+    return;
+  }
   for (int lane = 0; lane < block.num_lanes(); ++lane) {
-    const int64_t offset = out_base + block.query(lane) * a.out_strides.token;
-    if (a.element == Element::kF32)
-      for (int64_t d = 0; d < dim; ++d)
-        static_cast<float*>(a.out)[offset + d] = rows[d * kBlockQueries + lane];
-    else
-      for (int64_t d = 0; d < dim; ++d)
-        static_cast<uint16_t*>(a.out)[offset + d] = bf16[d * kBlockQueries + lane];
+    float* out = static_cast<float*>(a.out) + out_base + block.query(lane) * a.out_strides.token;
+    for (int64_t d = 0; d < dim; ++d) out[d] = rows[d * kBlockQueries + lane];
   }
 }
 
@@ -260,6 +265,7 @@ void run_blocks(const Arguments& a, const Kernel& kernel) {
       block.beta = beta;
 
       std::vector<uint16_t> rounded(static_cast<size_t>(out_floats));
+      std::vector<uint32_t> pairs(static_cast<size_t>(out_floats / 2));
       std::vector<std::vector<BiasedKey>> biased(static_cast<size_t>(run), {no_bias});
       std::vector<uint64_t> immoderate(static_cast<size_t>(run));
       int64_t listed_run =
@@ -273,7 +279,7 @@ void run_blocks(const Arguments& a, const Kernel& kernel) {
           if (buckets && listed_run != run_index)
             biased[static_cast<size_t>(i)] = biased_keys_of_block(*buckets, queries_of);
           const uint64_t lanes = pack_queries(a, kernel.packing, sizes, base(a.q_strides, head), queries_of,
-                                              scale, queries.get() + i * sizes.q_bytes);
+                                              scale, pairs.data(), queries.get() + i * sizes.q_bytes);
           immoderate[static_cast<size_t>(i)] = keys_moderate ? lanes : ~uint64_t{0};
         }
         listed_run = run_index;
