@@ -97,9 +97,7 @@ void add_ablate(CLI::App& program) {
     pipeline::Config config;
     apply_options(*given, config);
     config.asset = own->asset;
-    if (config.detail.prompt.empty())
-      throw Error(ErrorCode::kUsage, "--prompt",
-                  "say what the asset shall look like, e.g. --prompt \"a rusty old kettle\"");
+    require_prompt(config);
     if (own->output.empty())
       throw Error(ErrorCode::kUsage, "--output", "say in which folder the comparison goes, e.g. -o ablation");
     pipeline::AblationOptions options;

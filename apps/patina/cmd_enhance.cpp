@@ -20,9 +20,7 @@ void add_enhance(CLI::App& program) {
     pipeline::Config config;
     apply_options(*given, config);
     config.asset = *asset;
-    if (config.detail.prompt.empty())
-      throw Error(ErrorCode::kUsage, "--prompt",
-                  "say what the asset shall look like, e.g. --prompt \"a rusty old kettle\"");
+    require_prompt(config);
     if (config.output.empty())
       throw Error(ErrorCode::kUsage, "--output", "say where the result goes, e.g. -o rusty.glb");
     set_num_threads(config.num_threads);

@@ -41,9 +41,7 @@ void add_show_attention(CLI::App& program) {
     pipeline::Config config;
     apply_options(*given, config);
     config.asset = own->asset;
-    if (config.detail.prompt.empty())
-      throw Error(ErrorCode::kUsage, "--prompt",
-                  "say what the asset shall look like, e.g. --prompt \"a rusty old kettle\"");
+    require_prompt(config);
     if (own->output.empty())
       throw Error(ErrorCode::kUsage, "--output", "say where the picture goes, e.g. -o attention.html");
     pipeline::check_attention_output(own->output);

@@ -70,4 +70,10 @@ void apply_options(const GivenOptions& given, pipeline::Config& config) {
     if (cli->count() > 0) pipeline::find_option(name)->set(config, cli->reduced_results());
 }
 
+void require_prompt(const pipeline::Config& config) {
+  if (config.detail.prompt.empty())
+    throw Error(ErrorCode::kUsage, "--prompt",
+                "say what the asset shall look like, e.g. --prompt \"a rusty old kettle\"");
+}
+
 }  // namespace patina::app

@@ -27,4 +27,7 @@ std::shared_ptr<GivenOptions> add_options(CLI::App& command, unsigned stages,
 /// Sets on `config` first what the config file holds, then what the command line holds. Throws Error{kUsage}.
 void apply_options(const GivenOptions& given, pipeline::Config& config);
 
+/// Throws Error{kUsage} unless there is a prompt.
+void require_prompt(const pipeline::Config& config);
+
 }  // namespace patina::app
