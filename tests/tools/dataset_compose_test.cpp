@@ -1,5 +1,5 @@
-// Composed samples: light against the path tracer, masks where their recipes say, the same sample for the same
-// seed.
+// Composed samples: light against the path tracer, masks where their recipes say, the same sample for the
+// same seed.
 #include <cmath>
 
 #include <ATen/ATen.h>
@@ -33,7 +33,8 @@ BakeOptions bake_options() {
 // One view of a kettle in the studio, baked once and sent through the shard's compression for all tests.
 const Dataset& kettle_data() {
   static const Dataset data = [] {
-    BakedObject baked = bake(finished(make_shape(kKind, kSeed).mesh), render::studio_environment(), bake_options());
+    BakedObject baked =
+        bake(finished(make_shape(kKind, kSeed).mesh), render::studio_environment(), bake_options());
     baked.object.name = "kettle", baked.object.words = {"kettle"}, baked.object.environment = "studio";
     const test::TemporaryFolder folder;
     write_shard(folder.path() / "kettle.shard", entries_of(baked));
@@ -73,13 +74,15 @@ Image path_traced(const Uniform& material, int side) {
   orbit.azimuth_start = baked.azimuth_start, orbit.fov_y = baked.fov_y;
   views::ViewOptions options;
   options.path.samples_per_pixel = 96;
-  const auto set = views::render_views(scene, views::orbit_cameras({vec3(-1), vec3(1), 1.0f}, orbit), options, {});
+  const auto set =
+      views::render_views(scene, views::orbit_cameras({vec3(-1), vec3(1), 1.0f}, orbit), options, {});
   return views::tile_control(set.views[0], set.exposure_ev);
 }
 
 TEST(Compose, light_matches_the_path_tracer) {
-  for (const Uniform& material : {Uniform{"clay", {0.75f, 0.5f, 0.35f}, 0.9f, 0.0f}, Uniform{"lacquer", {0.6f, 0.1f, 0.1f}, 0.2f, 0.0f},
-                                  Uniform{"brass", {0.9f, 0.75f, 0.42f}, 0.35f, 1.0f}}) {
+  for (const Uniform& material :
+       {Uniform{"clay", {0.75f, 0.5f, 0.35f}, 0.9f, 0.0f}, Uniform{"lacquer", {0.6f, 0.1f, 0.1f}, 0.2f, 0.0f},
+        Uniform{"brass", {0.9f, 0.75f, 0.42f}, 0.35f, 1.0f}}) {
     Plan plan;
     plan.views = {0};
     plan.clean[0].color = material.srgb;
@@ -122,7 +125,8 @@ Batch only_main_layer(const std::string& name, uint64_t index) {
 }
 
 vec3 normal_of(const ViewData& view, size_t i, size_t pixels) {
-  const float x = 2.0f * view.planes[kNormalX * pixels + i] / 255.0f - 1, y = 2.0f * view.planes[kNormalY * pixels + i] / 255.0f - 1;
+  const float x = 2.0f * view.planes[kNormalX * pixels + i] / 255.0f - 1,
+              y = 2.0f * view.planes[kNormalY * pixels + i] / 255.0f - 1;
   return view.world_from_camera * vec3(x, y, std::sqrt(std::max(0.0f, 1 - x * x - y * y)));
 }
 
@@ -130,8 +134,10 @@ TEST(Compose, moss_and_snow_lie_on_top) {
   for (const char* name : {"moss", "snow"})
     for (uint64_t index = 0; index < 3; ++index) {
       const Batch batch = only_main_layer(name, index);
-      const double up = mean_mask(batch, [](const auto& view, size_t i, size_t n) { return normal_of(view, i, n).y > 0.6f; });
-      const double down = mean_mask(batch, [](const auto& view, size_t i, size_t n) { return normal_of(view, i, n).y < -0.1f; });
+      const double up = mean_mask(
+          batch, [](const auto& view, size_t i, size_t n) { return normal_of(view, i, n).y > 0.6f; });
+      const double down = mean_mask(
+          batch, [](const auto& view, size_t i, size_t n) { return normal_of(view, i, n).y < -0.1f; });
       EXPECT_GT(up, down + 0.2) << name;
     }
 }
@@ -139,8 +145,12 @@ TEST(Compose, moss_and_snow_lie_on_top) {
 TEST(Compose, edges_wear_first) {
   for (uint64_t index = 0; index < 3; ++index) {
     const Batch batch = only_main_layer("edge wear", index);
-    const double edges = mean_mask(batch, [](const auto& view, size_t i, size_t n) { return view.planes[kCurvatureFine * n + i] > 190; });
-    const double flat = mean_mask(batch, [](const auto& view, size_t i, size_t n) { return std::abs(view.planes[kCurvatureFine * n + i] - 140) < 15; });
+    const double edges = mean_mask(batch, [](const auto& view, size_t i, size_t n) {
+      return view.planes[kCurvatureFine * n + i] > 190;
+    });
+    const double flat = mean_mask(batch, [](const auto& view, size_t i, size_t n) {
+      return std::abs(view.planes[kCurvatureFine * n + i] - 140) < 15;
+    });
     EXPECT_GT(edges, flat + 0.2);
   }
 }
@@ -151,7 +161,8 @@ TEST(Compose, the_amount_is_the_share_of_the_surface) {
     Plan plan = plan_of(catalog, "rust", level, 7, 3, {});
     plan.layers.erase(plan.layers.begin(), plan.layers.end() - 1);
     const Batch batch = compose(kettle_library(), std::span(&plan, 1));
-    EXPECT_NEAR(mean_mask(batch, [](const auto&, size_t, size_t) { return true; }), plan.layers[0].mask.amount, 0.05);
+    EXPECT_NEAR(mean_mask(batch, [](const auto&, size_t, size_t) { return true; }),
+                plan.layers[0].mask.amount, 0.05);
   }
 }
 
@@ -182,6 +193,19 @@ TEST(Compose, samples_are_pictures_on_the_neutral_backdrop) {
     EXPECT_LT((picture.masked_select(outside) - views::kBackdropSrgb).abs().max().item<float>(), 1e-4f);
   }
   EXPECT_EQ(batch.normal.masked_select(outside).abs().max().item<float>(), 0.0f);
+}
+
+TEST(Compose, smaller_samples_show_the_same) {
+  const Catalog catalog = catalog_of(kettle_data());
+  const Plan plan = plan_of(catalog, "rust", 1, 7, 2, {});
+  const Batch full = compose(kettle_library(), std::span(&plan, 1));
+  for (const int side : {kViewSide / 2, kViewSide / 4}) {
+    const Batch small = compose(kettle_library(), std::span(&plan, 1), side);
+    ASSERT_EQ(small.target.size(2), side);
+    const int64_t k = kViewSide / side;
+    const Image expected = image_of(at::avg_pool2d(full.target, {k, k}, {k, k})[0]);
+    EXPECT_GT(report::psnr(image_of(small.target[0]), expected), 26.0f) << side;
+  }
 }
 
 TEST(Compose, a_clean_prompt_asks_for_no_change) {

@@ -25,7 +25,8 @@ PlaneStack some_planes(int width, int height) {
   const auto count = static_cast<size_t>(width) * static_cast<size_t>(height);
   stack.planes.assign(4, std::vector<float>(count));
   for (size_t i = 0; i < count; ++i) {
-    const auto x = static_cast<float>(i % static_cast<size_t>(width)), y = static_cast<float>(i / static_cast<size_t>(width));
+    const auto x = static_cast<float>(i % static_cast<size_t>(width)),
+               y = static_cast<float>(i / static_cast<size_t>(width));
     stack.planes[0][i] = 0.5f + 0.4f * std::sin(0.05f * x + 0.03f * y);
     stack.planes[1][i] = RandomStream(3, RandomPurpose::kTest, i).uniform();
     stack.planes[2][i] = 0.25f;
@@ -49,7 +50,8 @@ TEST(PlaneCodec, keeps_the_promised_precision) {
     EXPECT_EQ(read.width, width);
     for (const size_t c : {0u, 1u, 3u}) {
       // Rounding by 0.4 instead of to nearest costs up to 0.6 of a step in a coefficient.
-      EXPECT_LE(rms(read.planes[c], stack.planes[c]), 0.4 * static_cast<double>(kPrecision[c].step)) << "plane " << c;
+      EXPECT_LE(rms(read.planes[c], stack.planes[c]), 0.4 * static_cast<double>(kPrecision[c].step))
+          << "plane " << c;
     }
     for (const float value : read.planes[2]) EXPECT_NEAR(value, 0.25f, 0.01f);
   }
@@ -103,7 +105,9 @@ TEST(Shard, refuses_what_is_no_shard_or_ends_early) {
   write_shard(path, std::vector<Entry>{{{{"kind", "view"}, {"name", "a"}}, std::vector<uint8_t>(100)}});
   std::ifstream in(path, std::ios::binary);
   const std::string good((std::istreambuf_iterator<char>(in)), {});
-  std::vector<std::string> bad{"", "PMSHARD", "something else altogether", good.substr(0, 20), good.substr(0, good.size() - 1), good + "x"};
+  std::vector<std::string> bad{
+      "",        "PMSHARD", "something else altogether", good.substr(0, 20), good.substr(0, good.size() - 1),
+      good + "x"};
   bad.push_back(good);
   bad.back()[16] = '7';  // no array
   for (const std::string& text : bad) {
@@ -135,9 +139,12 @@ void write_small_data(const std::filesystem::path& folder) {
   camera.distance = 3, camera.fov_y = 0.6f;
   std::vector<std::vector<float>> planes(kNumViewPlanes, std::vector<float>(kPixels, 0.5f));
   std::fill(planes[kCoverage].begin(), planes[kCoverage].end(), 1.0f);
-  std::vector<Entry> entries{object_entry(object, std::vector(9, std::vector<float>(static_cast<size_t>(kGlossMapHeight) * kGlossMapWidth, 0.7f))),
-                             view_entry("plate", 0, camera, planes)};
-  std::vector<std::vector<float>> texels(kNumMaterialPlanes, std::vector<float>(static_cast<size_t>(kTextureSide) * kTextureSide, 0.25f));
+  std::vector<Entry> entries{
+      object_entry(object, std::vector(9, std::vector<float>(
+                                              static_cast<size_t>(kGlossMapHeight) * kGlossMapWidth, 0.7f))),
+      view_entry("plate", 0, camera, planes)};
+  std::vector<std::vector<float>> texels(
+      kNumMaterialPlanes, std::vector<float>(static_cast<size_t>(kTextureSide) * kTextureSide, 0.25f));
   std::fill(texels[kBaseR].begin(), texels[kBaseR].end(), 0.75f);
   entries.push_back(material_entry(some_material("red", "rust", false), texels, {{"author", "A"}}));
   entries.push_back(material_entry(some_material("other", "moss", true), texels, {{"author", "B"}}));
@@ -210,7 +217,8 @@ TEST_F(Plans, depend_on_seed_and_index_alone) {
 
 // The words that stand for a kind of ageing or a material, in a caption about it.
 bool says_any(const std::string& caption, const std::vector<std::string>& words) {
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return caption.find(word) != std::string::npos; });
+  return std::any_of(words.begin(), words.end(),
+                     [&](const std::string& word) { return caption.find(word) != std::string::npos; });
 }
 
 TEST_F(Plans, captions_say_what_is_asked_for) {
@@ -226,7 +234,8 @@ TEST_F(Plans, captions_say_what_is_asked_for) {
   }
   for (const CleanRecipe& recipe : clean_recipes())
     for (uint64_t index = 0; index < 30; ++index)
-      EXPECT_TRUE(says_any(plan_of(catalog_, recipe.name, 1, 1, index, {}).caption, recipe.words)) << recipe.name;
+      EXPECT_TRUE(says_any(plan_of(catalog_, recipe.name, 1, 1, index, {}).caption, recipe.words))
+          << recipe.name;
 }
 
 TEST_F(Plans, strength_words_go_with_the_amount) {
@@ -242,7 +251,8 @@ TEST_F(Plans, share_of_empty_captions_is_as_asked) {
   int empty = 0;
   PlanOptions options;
   options.empty_caption = 0.3f;
-  for (uint64_t index = 0; index < 1000; ++index) empty += draw_plan(catalog_, 9, index, options).caption.empty();
+  for (uint64_t index = 0; index < 1000; ++index)
+    empty += draw_plan(catalog_, 9, index, options).caption.empty();
   EXPECT_NEAR(empty, 300, 4 * std::sqrt(1000 * 0.3 * 0.7));
 }
 

@@ -96,8 +96,8 @@ class Gatherer {
       return (vec2(static_cast<float>(i % strata), static_cast<float>(i / strata)) + random.uniform2()) /
              static_cast<float>(strata);
     };
-    // Both ways of sampling see the environment and are weighed by the balance heuristic; the object itself is
-    // met by cosine samples alone.
+    // Both ways of sampling see the environment and are weighed by the balance heuristic; the object itself
+    // is met by cosine samples alone.
     const auto add_light = [&](const vec3& direction, const vec3& radiance, float cosine) {
       const float density = count * (cosine * kInvPi + environment.pdf(direction));
       const vec3 share = radiance * (cosine * kInvPi / density);
@@ -125,10 +125,11 @@ class Gatherer {
     return seen;
   }
 
-  // Σ G1(i) L / Σ G1(i) over visible normals: the specular lobe over its albedo without Fresnel [Heitz2018]. Wide
-  // lobes use the light samples of the diffuse part too, by the balance heuristic; in narrow ones those say nothing.
-  vec3 glossy(const render::SurfacePoint& point, const vec3& wo_world, float roughness, std::span<const Seen> lights,
-              RandomStream& random) const {
+  // Σ G1(i) L / Σ G1(i) over visible normals: the specular lobe over its albedo without Fresnel [Heitz2018].
+  // Wide lobes use the light samples of the diffuse part too, by the balance heuristic; in narrow ones those
+  // say nothing.
+  vec3 glossy(const render::SurfacePoint& point, const vec3& wo_world, float roughness,
+              std::span<const Seen> lights, RandomStream& random) const {
     const Basis basis = orthonormal_basis(point.n_shading);
     const auto local = [&](const vec3& v) {
       return vec3(glm::dot(v, basis.tangent), glm::dot(v, basis.bitangent), glm::dot(v, point.n_shading));
@@ -139,7 +140,8 @@ class Gatherer {
     const float alpha = render::alpha_from_roughness(roughness);
     const int strata = options_.gloss_strata;
     const auto num_lobe = static_cast<float>(strata * strata);
-    const float num_light = roughness > 0.3f ? static_cast<float>(options_.diffuse_strata * options_.diffuse_strata) : 0.0f;
+    const float num_light =
+        roughness > 0.3f ? static_cast<float>(options_.diffuse_strata * options_.diffuse_strata) : 0.0f;
     // Density of visible normals' reflections: D G1(o) / 4 cos o.
     const auto lobe_pdf = [&](const vec3& wi) {
       const vec3 h = glm::normalize(wo + wi);
@@ -150,8 +152,9 @@ class Gatherer {
     vec3 sum(0.0f);
     float weight = 0;
     for (int i = 0; i < strata * strata; ++i) {
-      const vec2 u = (vec2(static_cast<float>(i % strata), static_cast<float>(i / strata)) + random.uniform2()) /
-                     static_cast<float>(strata);
+      const vec2 u =
+          (vec2(static_cast<float>(i % strata), static_cast<float>(i / strata)) + random.uniform2()) /
+          static_cast<float>(strata);
       const vec3 h = render::sample_visible_normal(alpha, wo, u);
       const vec3 wi = 2.0f * glm::dot(wo, h) * h - wo;
       if (!(wi.z > 0.0f)) continue;
@@ -181,7 +184,8 @@ class Gatherer {
 };
 
 // Per-vertex values at a point of a triangle.
-float interpolated(const std::vector<float>& values, const asset::Primitive& primitive, const render::Hit& hit) {
+float interpolated(const std::vector<float>& values, const asset::Primitive& primitive,
+                   const render::Hit& hit) {
   const uvec3 t = primitive.triangles[hit.triangle];
   const vec2 b = hit.barycentric;
   return (1 - b.x - b.y) * values[t.x] + b.x * values[t.y] + b.y * values[t.z];
@@ -207,9 +211,11 @@ RawView trace(const render::Scene& scene, const Finished& finished, const render
   guide.normal = gbuffer.n_shading_world;
 
   parallel_for(0, kViewSide, 2, [&](int64_t begin, int64_t end) {
-    for (auto pixel = static_cast<size_t>(begin) * kViewSide; pixel < static_cast<size_t>(end) * kViewSide; ++pixel) {
+    for (auto pixel = static_cast<size_t>(begin) * kViewSide; pixel < static_cast<size_t>(end) * kViewSide;
+         ++pixel) {
       if (gbuffer.primitive[pixel] < 0) continue;
-      const vec2 center(static_cast<float>(pixel % kViewSide) + 0.5f, static_cast<float>(pixel / kViewSide) + 0.5f);
+      const vec2 center(static_cast<float>(pixel % kViewSide) + 0.5f,
+                        static_cast<float>(pixel / kViewSide) + 0.5f);
       const render::Ray ray = camera.ray(center);
       const auto hit = scene.intersect(ray);
       if (!hit) continue;
@@ -218,7 +224,9 @@ RawView trace(const render::Scene& scene, const Finished& finished, const render
       const Gatherer::Pixel light = gatherer.gather(point, -ray.direction, random);
       out.hit[pixel] = guide.valid[pixel] = 1;
       const auto set = [&](int plane, float value) { out.planes[static_cast<size_t>(plane)][pixel] = value; };
-      const auto set3 = [&](int plane, const vec3& v) { set(plane, v.x), set(plane + 1, v.y), set(plane + 2, v.z); };
+      const auto set3 = [&](int plane, const vec3& v) {
+        set(plane, v.x), set(plane + 1, v.y), set(plane + 2, v.z);
+      };
       const vec3 n = camera_from_world * point.n_shading;
       set(kNormalX, 0.5f + 0.5f * n.x);
       set(kNormalY, 0.5f + 0.5f * n.y);
@@ -232,7 +240,8 @@ RawView trace(const render::Scene& scene, const Finished& finished, const render
       set3(kLightR, light.light);
       set(kBounce, luminance(light.bounced));
       set3(kLightX, camera_from_world * light.toward_light);
-      for (int level = 0; level < 3; ++level) set3(kGloss0R + 3 * level, light.gloss[static_cast<size_t>(level)]);
+      for (int level = 0; level < 3; ++level)
+        set3(kGloss0R + 3 * level, light.gloss[static_cast<size_t>(level)]);
     }
   });
 
@@ -270,13 +279,15 @@ void encode_light(RawView& view, float unit) {
 // The environment seen through lobes about each direction (view along the normal), by their visible normals.
 std::vector<std::vector<float>> gloss_map(const render::Environment& environment, float unit) {
   constexpr int kStrata = 12;
-  std::vector<std::vector<float>> out(9, std::vector<float>(static_cast<size_t>(kGlossMapHeight) * kGlossMapWidth));
+  std::vector<std::vector<float>> out(
+      9, std::vector<float>(static_cast<size_t>(kGlossMapHeight) * kGlossMapWidth));
   parallel_for(0, kGlossMapHeight, 1, [&](int64_t begin, int64_t end) {
     for (int64_t y = begin; y < end; ++y)
       for (int x = 0; x < kGlossMapWidth; ++x) {
         const float polar = kPi * (static_cast<float>(y) + 0.5f) / kGlossMapHeight;
         const float azimuth = 2 * kPi * ((static_cast<float>(x) + 0.5f) / kGlossMapWidth - 0.5f);
-        const vec3 n(std::sin(polar) * std::cos(azimuth), std::cos(polar), std::sin(polar) * std::sin(azimuth));
+        const vec3 n(std::sin(polar) * std::cos(azimuth), std::cos(polar),
+                     std::sin(polar) * std::sin(azimuth));
         const Basis basis = orthonormal_basis(n);
         for (size_t level = 0; level < 3; ++level) {
           vec3 sum(0.0f);
@@ -284,7 +295,8 @@ std::vector<std::vector<float>> gloss_map(const render::Environment& environment
           for (int i = 0; i < kStrata * kStrata; ++i) {
             const vec2 u = (vec2(static_cast<float>(i % kStrata), static_cast<float>(i / kStrata)) + 0.5f) /
                            static_cast<float>(kStrata);
-            const vec3 h = render::sample_visible_normal(render::alpha_from_roughness(kGlossRoughness[level]), vec3(0, 0, 1), u);
+            const vec3 h = render::sample_visible_normal(render::alpha_from_roughness(kGlossRoughness[level]),
+                                                         vec3(0, 0, 1), u);
             const vec3 wi(2 * h.z * h.x, 2 * h.z * h.y, 2 * h.z * h.z - 1);
             if (!(wi.z > 0)) continue;
             sum += wi.z * environment.radiance(wi.x * basis.tangent + wi.y * basis.bitangent + wi.z * n);

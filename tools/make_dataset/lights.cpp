@@ -68,14 +68,17 @@ Image boxes(Draw& draw) {
 
 // A sky over ground, with a veiled sun.
 Image sky(Draw& draw) {
-  const vec3 zenith = draw(0.4f, 1.0f) * vec3(0.75f, 0.9f, draw(1.0f, 1.35f)), horizon = draw(0.7f, 1.3f) * tinted(draw, 0.15f);
+  const vec3 zenith = draw(0.4f, 1.0f) * vec3(0.75f, 0.9f, draw(1.0f, 1.35f)),
+             horizon = draw(0.7f, 1.3f) * tinted(draw, 0.15f);
   const vec3 ground = draw(0.1f, 0.45f) * tinted(draw, 0.15f), sun = toward(draw, 12, 70);
   const vec3 sun_light = draw(4.0f, 26.0f) * tinted(draw, 0.2f);
   const float size = glm::radians(draw(5.0f, 14.0f));
   return painted([&](const vec3& d) {
-    vec3 light = d.y > 0 ? glm::mix(horizon, zenith, std::sqrt(d.y)) : glm::mix(horizon * 0.8f, ground, glm::smoothstep(0.0f, 0.15f, -d.y));
+    vec3 light = d.y > 0 ? glm::mix(horizon, zenith, std::sqrt(d.y))
+                         : glm::mix(horizon * 0.8f, ground, glm::smoothstep(0.0f, 0.15f, -d.y));
     const float angle = std::acos(glm::clamp(glm::dot(d, sun), -1.0f, 1.0f));
-    light += sun_light * (1 - glm::smoothstep(0.6f * size, 1.4f * size, angle)) + 0.5f * std::exp(-angle / 0.35f) * tinted(draw, 0.0f);
+    light += sun_light * (1 - glm::smoothstep(0.6f * size, 1.4f * size, angle)) +
+             0.5f * std::exp(-angle / 0.35f) * tinted(draw, 0.0f);
     return light;
   });
 }
@@ -88,8 +91,10 @@ Image reduced(const Image& map) {
     for (int x = 0; x < kWidth; ++x) {
       vec3 sum(0.0f);
       int count = 0;
-      for (int v = y * map.height / kHeight; v < std::max((y + 1) * map.height / kHeight, y * map.height / kHeight + 1); ++v)
-        for (int u = x * map.width / kWidth; u < std::max((x + 1) * map.width / kWidth, x * map.width / kWidth + 1); ++u, ++count)
+      for (int v = y * map.height / kHeight;
+           v < std::max((y + 1) * map.height / kHeight, y * map.height / kHeight + 1); ++v)
+        for (int u = x * map.width / kWidth;
+             u < std::max((x + 1) * map.width / kWidth, x * map.width / kWidth + 1); ++u, ++count)
           sum += map.rgb(u, v);
       out.set_rgb(x, y, sum / static_cast<float>(count));
       mean += luminance(out.rgb(x, y)) / (kWidth * kHeight);
@@ -111,8 +116,9 @@ Image turned(const Image& map, int columns) {
   return out;
 }
 
-const std::vector<std::string> kPhotographs{"adams_place_bridge_1k.hdr", "st_fagans_interior_1k.hdr", "kiara_1_dawn_1k.hdr",
-                                            "blender_studio.exr", "blender_courtyard.exr"};
+const std::vector<std::string> kPhotographs{"adams_place_bridge_1k.hdr", "st_fagans_interior_1k.hdr",
+                                            "kiara_1_dawn_1k.hdr", "blender_studio.exr",
+                                            "blender_courtyard.exr"};
 const std::string kHeldOutPhotograph = "studio_small_03_1k.hdr";
 
 }  // namespace
@@ -124,12 +130,14 @@ Light make_light(uint64_t seed, const std::filesystem::path& hdri, bool held_out
   const bool photographs = !hdri.empty() && std::filesystem::is_directory(hdri);
   if (held_out && photographs && kind < 0.5f)
     return {kHeldOutPhotograph, true,
-            render::Environment(turned(reduced(render::read_environment(hdri / kHeldOutPhotograph).map()), turn))};
+            render::Environment(
+                turned(reduced(render::read_environment(hdri / kHeldOutPhotograph).map()), turn))};
   // The product's own studio is what users see most, and stands as it stands there.
   if (kind < 0.4f) return {"studio", false, render::Environment(reduced(render::studio_environment().map()))};
   if (kind < 0.6f && photographs) {
     const std::string name = draw.of(kPhotographs);
-    return {name, false, render::Environment(turned(reduced(render::read_environment(hdri / name).map()), turn))};
+    return {name, false,
+            render::Environment(turned(reduced(render::read_environment(hdri / name).map()), turn))};
   }
   if (kind < 0.82f) return {"soft boxes", false, render::Environment(boxes(draw))};
   return {"sky", false, render::Environment(sky(draw))};

@@ -1,4 +1,5 @@
 // make_dataset: makes the data that patina-mini is trained on. See docs/dataset.md.
+#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -16,18 +17,20 @@ using namespace patina;
 namespace fs = std::filesystem;
 
 constexpr const char* kUsage =
-    "usage: make_dataset objects --shared SHARED --count N WORK      bake N objects of four views (resumable)\n"
+    "usage: make_dataset objects --shared SHARED --count N WORK      bake N objects of four views "
+    "(resumable)\n"
     "       make_dataset materials --shared SHARED [--limit N] WORK  pack photographed materials\n"
     "       make_dataset pack WORK SHARDS                            gather both into a few shards\n"
     "       make_dataset preview SHARDS -o SHEET.png [--seed N] [--rows N] [--width N]\n"
-    "                    [--only NAME] [--held-out]                  look at samples; captions in SHEET.png.txt\n";
+    "                    [--only NAME] [--held-out]                  look at samples; captions in "
+    "SHEET.png.txt\n";
 
 struct Arguments {
   std::vector<std::string> positional;
   fs::path shared, output;
   std::string only;
-  int count = 80, limit = 10, rows = 8, width = 160;
-  uint64_t seed = 0;
+  int count = 80, limit = 16, rows = 8, width = 160;
+  int64_t seed = 0;
   bool held_out = false, good = true;
 };
 
@@ -38,19 +41,35 @@ Arguments parsed(int argc, char** argv) {
     const auto value = [&]() -> std::string {
       if (i + 1 < argc) return argv[++i];
       out.good = false;
-      return "0";
+      return "";
     };
-    if (word == "--shared") out.shared = value();
-    else if (word == "-o") out.output = value();
-    else if (word == "--count") out.count = std::stoi(value());
-    else if (word == "--limit") out.limit = std::stoi(value());
-    else if (word == "--rows") out.rows = std::stoi(value());
-    else if (word == "--width") out.width = std::stoi(value());
-    else if (word == "--only") out.only = value();
-    else if (word == "--seed") out.seed = std::stoull(value());
-    else if (word == "--held-out") out.held_out = true;
-    else if (word.rfind("-", 0) == 0) out.good = false;
-    else out.positional.push_back(word);
+    const auto number = [&](auto& into) {
+      const std::string text = value();
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), into);
+      if (error != std::errc() || end != text.data() + text.size() || into < 0) out.good = false;
+    };
+    if (word == "--shared")
+      out.shared = value();
+    else if (word == "-o")
+      out.output = value();
+    else if (word == "--only")
+      out.only = value();
+    else if (word == "--held-out")
+      out.held_out = true;
+    else if (word == "--count")
+      number(out.count);
+    else if (word == "--limit")
+      number(out.limit);
+    else if (word == "--rows")
+      number(out.rows);
+    else if (word == "--width")
+      number(out.width);
+    else if (word == "--seed")
+      number(out.seed);
+    else if (word.rfind("-", 0) == 0)
+      out.good = false;
+    else
+      out.positional.push_back(word);
   }
   return out;
 }
@@ -62,8 +81,9 @@ Progress console() {
   progress.on_update = [start](std::string_view task, double done, double total) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const double left = done > 0 ? seconds * (total - done) / done : 0;
-    std::fprintf(stderr, "\r%.*s %.0f of %.0f, %.0f s gone, about %.0f s left   %s", static_cast<int>(task.size()), task.data(),
-                 done, total, seconds, left, done >= total ? "\n" : "");
+    std::fprintf(stderr, "\r%.*s %.0f of %.0f, %.0f s gone, about %.0f s left   %s",
+                 static_cast<int>(task.size()), task.data(), done, total, seconds, left,
+                 done >= total ? "\n" : "");
   };
   progress.on_warning = [](std::string_view text) {
     std::fprintf(stderr, "\nwarning: %.*s\n", static_cast<int>(text.size()), text.data());
@@ -87,7 +107,8 @@ int main(int argc, char** argv) {
     } else if (command == "pack" && has(2)) {
       std::fputs(pack(a.positional[0], a.positional[1]).c_str(), stdout);
     } else if (command == "preview" && has(1) && !a.output.empty()) {
-      write_preview(a.positional[0], a.output, {a.seed, a.rows, a.held_out, a.only, a.width});
+      write_preview(a.positional[0], a.output,
+                    {static_cast<uint64_t>(a.seed), a.rows, a.held_out, a.only, a.width});
     } else {
       std::fputs(kUsage, stderr);
       return 2;

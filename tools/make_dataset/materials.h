@@ -9,9 +9,9 @@
 
 namespace patina::make_dataset {
 
-/// `folder` holds index.json as its README describes. Left out: materials whose licence is only inferred from
-/// file names, scans that are not square, and what lies beyond `limit` a class. About one in six of every class
-/// with four or more is held out. Throws Error{kNotFound, kFormat}.
+/// `folder` holds index.json as its README describes. Left out: classes that no recipe uses, materials whose
+/// licence is only inferred from file names, scans that are not square, and what lies beyond `limit` a class.
+/// About one in six of every class with four or more is held out. Throws Error{kNotFound, kFormat}.
 std::vector<mini_data::Entry> material_entries(const std::filesystem::path& folder, int limit,
                                                const Progress& progress);
 

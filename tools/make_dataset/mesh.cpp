@@ -76,7 +76,9 @@ void split_long_edges(Mesh& mesh, float length) {
       } else {
         // Turned so that the first side is split, and with two splits the third is not.
         int turn = 0;
-        while (m[static_cast<size_t>(turn)] < 0 || (count == 2 && m[static_cast<size_t>((turn + 2) % 3)] >= 0)) ++turn;
+        while (m[static_cast<size_t>(turn)] < 0 ||
+               (count == 2 && m[static_cast<size_t>((turn + 2) % 3)] >= 0))
+          ++turn;
         const uint32_t a = t[turn], b = t[(turn + 1) % 3], c = t[(turn + 2) % 3];
         const int64_t ab = m[static_cast<size_t>(turn)], bc = m[static_cast<size_t>((turn + 1) % 3)];
         if (bc < 0) {
@@ -116,7 +118,8 @@ Neighbours neighbours_of(const Mesh& mesh) {
 std::vector<vec3> face_normals(const Mesh& mesh) {
   std::vector<vec3> out;  // twice the area long
   for (const uvec3& t : mesh.triangles)
-    out.push_back(glm::cross(mesh.positions[t.y] - mesh.positions[t.x], mesh.positions[t.z] - mesh.positions[t.x]));
+    out.push_back(
+        glm::cross(mesh.positions[t.y] - mesh.positions[t.x], mesh.positions[t.z] - mesh.positions[t.x]));
   return out;
 }
 
@@ -130,8 +133,8 @@ std::vector<float> spread(const Mesh& mesh, const Neighbours& near, const std::v
     edge += std::min({glm::length(a - b), glm::length(b - c), glm::length(c - a)});
   }
   edge /= std::max<double>(1, static_cast<double>(mesh.triangles.size()));
-  // A step moves half of a value one edge away: variance grows by edge² / 2 a step. A few steps at least, since
-  // curvature sits on edges and the vertices of a triangle get unequal parts.
+  // A step moves half of a value one edge away: variance grows by edge² / 2 a step. A few steps at least,
+  // since curvature sits on edges and the vertices of a triangle get unequal parts.
   const int steps = std::clamp(static_cast<int>(2.0 * square(radius / static_cast<float>(edge))), 6, 120);
   std::vector<float> next(value.size());
   for (int step = 0; step < steps; ++step) {
@@ -149,10 +152,12 @@ std::vector<float> spread(const Mesh& mesh, const Neighbours& near, const std::v
   return value;
 }
 
-// Mean curvature times two from the angles between faces [Cohen-Steiner2003, Sec. 3.4]: Σ |e| θ_e / area, positive where
-// convex. It holds for rounded and for sharp edges alike.
-std::vector<float> bending(const Mesh& mesh, const std::vector<vec3>& normals, const std::vector<float>& area) {
-  std::map<std::pair<uint32_t, uint32_t>, std::pair<size_t, uint32_t>> open;  // edge → first triangle, its far corner
+// Mean curvature times two from the angles between faces [Cohen-Steiner2003, Sec. 3.4]: Σ |e| θ_e / area,
+// positive where convex. It holds for rounded and for sharp edges alike.
+std::vector<float> bending(const Mesh& mesh, const std::vector<vec3>& normals,
+                           const std::vector<float>& area) {
+  std::map<std::pair<uint32_t, uint32_t>, std::pair<size_t, uint32_t>>
+      open;  // edge → first triangle, its far corner
   std::vector<float> sum(mesh.positions.size());
   for (size_t f = 0; f < mesh.triangles.size(); ++f) {
     const uvec3& t = mesh.triangles[f];
@@ -169,8 +174,10 @@ std::vector<float> bending(const Mesh& mesh, const std::vector<vec3>& normals, c
       if (lengths > 0.0f) {
         const float angle = std::acos(glm::clamp(glm::dot(n1, n2) / lengths, -1.0f, 1.0f));
         // Convex where the other triangle's far corner lies below this one's plane.
-        const float side = glm::dot(n1, mesh.positions[at->second.second] - mesh.positions[a]) < 0.0f ? 1.0f : -1.0f;
-        const float share = 0.5f * side * std::min(angle, 2.0f) * glm::length(mesh.positions[a] - mesh.positions[b]);
+        const float side =
+            glm::dot(n1, mesh.positions[at->second.second] - mesh.positions[a]) < 0.0f ? 1.0f : -1.0f;
+        const float share =
+            0.5f * side * std::min(angle, 2.0f) * glm::length(mesh.positions[a] - mesh.positions[b]);
         sum[a] += share;
         sum[b] += share;
       }
@@ -181,7 +188,8 @@ std::vector<float> bending(const Mesh& mesh, const std::vector<vec3>& normals, c
   return sum;
 }
 
-// Water starts where the surface folds inward or ends in a ledge, and runs to lower neighbours, drying on its way.
+// Water starts where the surface folds inward or ends in a ledge, and runs to lower neighbours, drying on its
+// way.
 std::vector<float> flow_of(const Mesh& mesh, const Neighbours& near, const std::vector<float>& bend,
                            const std::vector<vec3>& normals) {
   std::vector<uint32_t> from_top(mesh.positions.size());
@@ -261,7 +269,8 @@ Finished finished(const Mesh& raw, float crease) {
   std::vector<float> fine = spread(mesh, near, area, bend, 0.025f);
   std::vector<float> coarse = spread(mesh, near, area, bend, 0.09f);
   const std::vector<float> flow = flow_of(mesh, near, fine, smooth);
-  // A right angle spread over its radius ends near the limits; a sphere of the object's size stays near the middle.
+  // A right angle spread over its radius ends near the limits; a sphere of the object's size stays near the
+  // middle.
   const auto coded = [](float bent, float unit) { return 0.5f + 0.5f * std::tanh(bent / unit); };
   for (float& value : fine) value = coded(value, 14.0f);
   for (float& value : coarse) value = coded(value - 2.0f, 6.0f);

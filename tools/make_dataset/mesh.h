@@ -1,5 +1,5 @@
-// Triangle meshes under construction, and what ageing needs to know of a finished one: curvature at two scales
-// and where water would run.
+// Triangle meshes under construction, and what ageing needs to know of a finished one: curvature at two
+// scales and where water would run.
 #pragma once
 
 #include <functional>

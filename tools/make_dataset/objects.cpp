@@ -20,7 +20,8 @@ struct KnownAsset {
   bool held_out;
 };
 
-// CC0 or public domain by their README. The water bottle, the toy car and the shoe stay out altogether: results are judged on them.
+// CC0 or public domain by their README. The water bottle, the toy car and the shoe stay out altogether:
+// results are judged on them.
 const std::vector<KnownAsset>& known_assets() {
   static const std::vector<KnownAsset> all{
       {"Spot/spot_triangulated.obj", {"cow", "animal figure", "toy"}, false},
@@ -35,7 +36,8 @@ const std::vector<KnownAsset>& known_assets() {
 
 Mesh mesh_of(const asset::Asset& asset) {
   Mesh out;
-  for (const asset::Primitive& primitive : asset.primitives) append(out, Mesh{primitive.p_world, primitive.triangles});
+  for (const asset::Primitive& primitive : asset.primitives)
+    append(out, Mesh{primitive.p_world, primitive.triangles});
   return out;
 }
 
@@ -45,12 +47,15 @@ std::vector<ObjectPlan> object_plans(int count) {
   std::vector<ObjectPlan> out;
   const auto& kinds = shape_kinds();
   const auto& assets = known_assets();
-  // Assets come in where a round of kinds ends, one a round.
+  // Assets take the places of a few kinds, one in the first round and three in later ones.
+  const auto is_asset_place = [&](size_t kind, uint64_t i) {
+    return kind == kinds.size() / 2 || (i >= kinds.size() && (kind == 10 || kind == 24));
+  };
   size_t kind = 0, asset = 0;
   for (uint64_t i = 0; static_cast<int>(out.size()) < count; ++i) {
     ObjectPlan plan;
     plan.seed = i + 1;
-    if (kind == kinds.size() / 2 && asset < assets.size()) {
+    if (is_asset_place(kind, i) && asset < assets.size()) {
       plan.kind = assets[asset].path;
       plan.words = assets[asset].words;
       plan.held_out = assets[asset].held_out;
@@ -103,7 +108,8 @@ void bake_objects(const std::vector<ObjectPlan>& plans, const fs::path& shared, 
     options.elevation = glm::radians(draw.chance(0.3f) ? 20.0f : draw(-10, 50));
     options.azimuth_start = draw(0, 2 * kPi);
     options.fov_y = glm::radians(draw.chance(0.5f) ? 35.0f : draw(25, 50));
-    const Light light = make_light(plan.seed, shared.empty() ? fs::path() : shared / "assets" / "hdri", plan.held_out);
+    const Light light =
+        make_light(plan.seed, shared.empty() ? fs::path() : shared / "assets" / "hdri", plan.held_out);
     BakedObject baked = bake(finished(mesh), light.environment, options, progress);
     baked.object.name = plan.name;
     baked.object.words = words;

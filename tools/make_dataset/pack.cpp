@@ -28,7 +28,8 @@ std::string pack(const fs::path& work, const fs::path& shards) {
     for (const auto& item : fs::directory_iterator(work / "objects"))
       if (item.path().extension() == ".shard") objects.push_back(item.path());
   if (objects.empty())
-    throw Error(ErrorCode::kNotFound, (work / "objects").string(), "holds no baked objects; run make_dataset objects");
+    throw Error(ErrorCode::kNotFound, (work / "objects").string(),
+                "holds no baked objects; run make_dataset objects");
   std::sort(objects.begin(), objects.end());
 
   // Shards of an earlier, larger set must not stay among the new ones.

@@ -43,7 +43,8 @@ void write_preview(const std::filesystem::path& shards, const std::filesystem::p
       const auto sample = static_cast<int64_t>(k);
       for (const at::Tensor& picture : {batch.tile[sample], batch.normal[sample], batch.target[sample]})
         pictures.push_back(image_of(picture));
-      captions += std::to_string(i + static_cast<int>(k)) + "  " + (plans[k].caption.empty() ? "(empty)" : plans[k].caption) + "\n";
+      captions += std::to_string(i + static_cast<int>(k)) + "  " +
+                  (plans[k].caption.empty() ? "(empty)" : plans[k].caption) + "\n";
     }
   }
   write_image(sheet, report::contact_sheet(pictures, 3 * kSamplesARow, options.tile_width));

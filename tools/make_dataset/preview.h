@@ -11,8 +11,9 @@ struct PreviewOptions {
   uint64_t seed = 0;
   int rows = 8;
   bool held_out = false;  // shapes, lights and materials that are kept for testing
-  std::string only;       // one kind of ageing or clean material, slightly, as it is and heavily in turn; empty: all
-  int tile_width = 160;   // pixels of a picture
+  std::string
+      only;  // one kind of ageing or clean material, slightly, as it is and heavily in turn; empty: all
+  int tile_width = 160;  // pixels of a picture
 };
 
 /// Rows of three samples each: tile, normal image, target; the captions are written to `sheet` with ".txt"

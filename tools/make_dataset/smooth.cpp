@@ -54,7 +54,8 @@ void fill_around(int width, int height, const std::vector<uint8_t>& valid, std::
     next.weight.assign(size, 0.0f);
     for (int y = 0; y < fine.height; ++y)
       for (int x = 0; x < fine.width; ++x) {
-        const auto from = static_cast<size_t>(y * fine.width + x), to = static_cast<size_t>(y / 2 * next.width + x / 2);
+        const auto from = static_cast<size_t>(y * fine.width + x),
+                   to = static_cast<size_t>(y / 2 * next.width + x / 2);
         next.value[to] += fine.weight[from] * fine.value[from];
         next.weight[to] += fine.weight[from];
       }
@@ -72,14 +73,17 @@ void fill_around(int width, int height, const std::vector<uint8_t>& valid, std::
       for (int x = 0; x < fine.width; ++x) {
         const auto i = static_cast<size_t>(y * fine.width + x);
         if (fine.weight[i] >= 1.0f) continue;
-        const float u = glm::clamp(0.5f * static_cast<float>(x) - 0.25f, 0.0f, static_cast<float>(coarse.width - 1));
-        const float v = glm::clamp(0.5f * static_cast<float>(y) - 0.25f, 0.0f, static_cast<float>(coarse.height - 1));
+        const float u =
+            glm::clamp(0.5f * static_cast<float>(x) - 0.25f, 0.0f, static_cast<float>(coarse.width - 1));
+        const float v =
+            glm::clamp(0.5f * static_cast<float>(y) - 0.25f, 0.0f, static_cast<float>(coarse.height - 1));
         const int x0 = static_cast<int>(u), y0 = static_cast<int>(v);
         const int x1 = std::min(x0 + 1, coarse.width - 1), y1 = std::min(y0 + 1, coarse.height - 1);
         const auto at = [&](int a, int b) { return coarse.value[static_cast<size_t>(b * coarse.width + a)]; };
         const float known = fine.weight[i] > 0 ? fine.weight[i] * fine.value[i] : 0.0f;
         const float guess = glm::mix(glm::mix(at(x0, y0), at(x1, y0), u - static_cast<float>(x0)),
-                                     glm::mix(at(x0, y1), at(x1, y1), u - static_cast<float>(x0)), v - static_cast<float>(y0));
+                                     glm::mix(at(x0, y1), at(x1, y1), u - static_cast<float>(x0)),
+                                     v - static_cast<float>(y0));
         fine.value[i] = known + (1.0f - fine.weight[i]) * guess;
       }
   }

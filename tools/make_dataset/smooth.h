@@ -15,8 +15,8 @@ struct SmoothingGuide {
   std::vector<vec3> position, normal;
 };
 
-/// Replaces each plane by its mean over (2 radius + 1)² pixels, weighed by distance, bend and height above the
-/// tangent plane [Eisemann2004]. Pixels that are not valid stay as they are and count nowhere.
+/// Replaces each plane by its mean over (2 radius + 1)² pixels, weighed by distance, bend and height above
+/// the tangent plane [Eisemann2004]. Pixels that are not valid stay as they are and count nowhere.
 void smooth(const SmoothingGuide& guide, const std::vector<std::vector<float>*>& planes, int radius);
 
 /// Gives pixels that are not valid the values of valid ones nearby, smoothly: averages of ever larger squares

@@ -16,7 +16,8 @@ std::vector<V> catmull_rom(const std::vector<V>& points, int steps) {
   std::vector<V> out;
   const auto at = [&](size_t i, int step) {
     const auto j = static_cast<ptrdiff_t>(i) + step;
-    return points[static_cast<size_t>(std::clamp<ptrdiff_t>(j, 0, static_cast<ptrdiff_t>(points.size()) - 1))];
+    return points[static_cast<size_t>(
+        std::clamp<ptrdiff_t>(j, 0, static_cast<ptrdiff_t>(points.size()) - 1))];
   };
   for (size_t i = 0; i + 1 < points.size(); ++i)
     for (int s = 0; s < steps; ++s) {
@@ -43,8 +44,9 @@ Mesh rounded_box(const vec3& half, float radius) {
                // Points are dense near the edges, where the surface bends.
                const auto eased = [&](float t, float extent) {
                  const float share = std::min(0.5f * r / extent, 0.45f), k = 0.25f;
-                 const float s = t < k ? t / k * share : t > 1 - k ? 1 - (1 - t) / k * share
-                                                              : share + (t - k) / (1 - 2 * k) * (1 - 2 * share);
+                 const float s = t < k       ? t / k * share
+                                 : t > 1 - k ? 1 - (1 - t) / k * share
+                                             : share + (t - k) / (1 - 2 * k) * (1 - 2 * share);
                  return (2 * s - 1) * extent;
                };
                const int a = (axis + 1) % 3, b = (axis + 2) % 3;
@@ -76,7 +78,8 @@ Mesh lathe(const std::vector<vec2>& profile, int flutes, float flute_depth) {
     const auto i = static_cast<size_t>(std::lround(v * last));
     const float angle = u < 1.0f ? -2 * kPi * u : 0.0f;  // exactly closed
     float radius = profile[i].x;
-    if (flutes > 0) radius *= 1.0f - flute_depth * square(std::sin(0.5f * static_cast<float>(flutes) * angle));
+    if (flutes > 0)
+      radius *= 1.0f - flute_depth * square(std::sin(0.5f * static_cast<float>(flutes) * angle));
     return vec3(radius * std::cos(angle), profile[i].y, radius * std::sin(angle));
   });
 }
@@ -98,7 +101,8 @@ Mesh tube(const std::vector<vec3>& path, const std::vector<float>& radii, bool c
   append(out, grid(kAround, static_cast<int>(n) - 1, [&](float u, float v) {
            const auto i = static_cast<size_t>(std::lround(v * last));
            const float angle = u < 1.0f ? 2 * kPi * u : 0.0f;
-           return path[i] + radii[i] * (std::cos(angle) * side[i] + std::sin(angle) * glm::cross(tangent[i], side[i]));
+           return path[i] +
+                  radii[i] * (std::cos(angle) * side[i] + std::sin(angle) * glm::cross(tangent[i], side[i]));
          }));
   if (!closed) {
     for (const bool at_end : {false, true}) {
@@ -120,12 +124,18 @@ Mesh prism(const std::vector<vec2>& polygon, float half_depth, float bevel) {
   const auto n = static_cast<int>(polygon.size());
   const auto ring = [&](int k) -> std::pair<float, float> {  // how far inside, z
     switch (k) {
-      case 0: return {1.0f, -half_depth};
-      case 1: return {bevel, -half_depth};
-      case 2: return {0.0f, -half_depth + bevel};
-      case 3: return {0.0f, half_depth - bevel};
-      case 4: return {bevel, half_depth};
-      default: return {1.0f, half_depth};
+      case 0:
+        return {1.0f, -half_depth};
+      case 1:
+        return {bevel, -half_depth};
+      case 2:
+        return {0.0f, -half_depth + bevel};
+      case 3:
+        return {0.0f, half_depth - bevel};
+      case 4:
+        return {bevel, half_depth};
+      default:
+        return {1.0f, half_depth};
     }
   };
   return grid(n, 5, [&](float u, float v) {
@@ -142,16 +152,17 @@ Mesh prism(const std::vector<vec2>& polygon, float half_depth, float bevel) {
 Mesh icosphere(int rounds) {
   const float t = 0.5f * (1.0f + std::sqrt(5.0f));
   Mesh mesh;
-  mesh.positions = {{-1, t, 0}, {1, t, 0}, {-1, -t, 0}, {1, -t, 0}, {0, -1, t}, {0, 1, t},
-                    {0, -1, -t}, {0, 1, -t}, {t, 0, -1}, {t, 0, 1}, {-t, 0, -1}, {-t, 0, 1}};
-  mesh.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                    {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  mesh.positions = {{-1, t, 0},  {1, t, 0},  {-1, -t, 0}, {1, -t, 0}, {0, -1, t},  {0, 1, t},
+                    {0, -1, -t}, {0, 1, -t}, {t, 0, -1},  {t, 0, 1},  {-t, 0, -1}, {-t, 0, 1}};
+  mesh.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                    {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                    {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   for (vec3& p : mesh.positions) p = glm::normalize(p);
   for (int round = 0; round < rounds; ++round) {
     std::map<std::pair<uint32_t, uint32_t>, uint32_t> middle;
     const auto between = [&](uint32_t a, uint32_t b) {
-      const auto [at, is_new] = middle.emplace(std::minmax(a, b), static_cast<uint32_t>(mesh.positions.size()));
+      const auto [at, is_new] =
+          middle.emplace(std::minmax(a, b), static_cast<uint32_t>(mesh.positions.size()));
       if (is_new) mesh.positions.push_back(glm::normalize(mesh.positions[a] + mesh.positions[b]));
       return at->second;
     };
@@ -175,6 +186,50 @@ std::vector<vec3> smooth_curve(const std::vector<vec3>& points, int steps) {
 
 mat4 placed(const vec3& offset, float degrees, const vec3& axis, const vec3& scale) {
   return glm::scale(glm::rotate(glm::translate(mat4(1.0f), offset), glm::radians(degrees), axis), scale);
+}
+
+Profile joined(Profile a, const Profile& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+Profile vessel(const Profile& outer, float wall) {
+  Profile out = outer;
+  const vec2 rim = outer.back();
+  out.push_back({rim.x - 0.3f * wall, rim.y + 0.4f * wall});
+  out.push_back({rim.x - 0.7f * wall, rim.y + 0.4f * wall});
+  for (size_t i = outer.size(); i-- > 0;)
+    out.push_back({std::max(outer[i].x - wall, 0.0f), std::max(outer[i].y, outer.front().y + wall)});
+  out.back().x = 0.0f;
+  return out;
+}
+
+Mesh torus_mesh(float large, float small, float arc) {
+  std::vector<vec3> path;
+  for (int i = 0; i <= 64; ++i) {
+    const float a = 2 * kPi * arc * static_cast<float>(i) / 64;
+    path.emplace_back(large * std::cos(a), large * std::sin(a), 0.0f);
+  }
+  return tube(path, std::vector<float>(path.size(), small), arc >= 1.0f);
+}
+
+Mesh cylinder(float radius, float height, float bevel) {
+  return lathe({{0, 0},
+                {radius - bevel, 0},
+                {radius - 0.3f * bevel, 0.3f * bevel},
+                {radius, bevel},
+                {radius, height - bevel},
+                {radius - 0.3f * bevel, height - 0.3f * bevel},
+                {radius - bevel, height},
+                {0, height}});
+}
+
+Mesh bent_tube(const std::vector<vec3>& points, float from, float to) {
+  const auto path = smooth_curve(points, 12);
+  std::vector<float> radii;
+  for (size_t i = 0; i < path.size(); ++i)
+    radii.push_back(glm::mix(from, to, static_cast<float>(i) / static_cast<float>(path.size() - 1)));
+  return tube(path, radii);
 }
 
 }  // namespace patina::make_dataset

@@ -19,7 +19,8 @@ constexpr double kBackdrop = 0.2140411;  // linear light of sRGB ½, views::kBac
 constexpr double kMiddleGrey = 0.18;     // views::kMiddleGrey
 
 // views::choose_exposure over the samples of each plan: [plans] of 2^EV.
-Tensor exposure_of(const Tensor& radiance, const SurfaceValues& surface, const Tensor& coverage, int64_t num_plans) {
+Tensor exposure_of(const Tensor& radiance, const SurfaceValues& surface, const Tensor& coverage,
+                   int64_t num_plans) {
   const Tensor base = luminance(surface.albedo);
   constexpr double kGloss = 0.025;
   const Tensor reflectance =
@@ -40,8 +41,9 @@ Tensor displayed(const Tensor& radiance, const Tensor& coverage, const Tensor& s
 
 }  // namespace
 
-Batch compose(const Library& library, std::span<const Plan> plans) {
+Batch compose(const Library& library, std::span<const Plan> plans, int side) {
   PATINA_CHECK(!plans.empty());
+  PATINA_CHECK(side == kViewSide || side == kViewSide / 2 || side == kViewSide / 4);
   const at::NoGradGuard no_gradients;
   const size_t views_a_plan = plans.front().views.size();
   std::vector<const Plan*> samples;
@@ -55,7 +57,7 @@ Batch compose(const Library& library, std::span<const Plan> plans) {
     }
   }
   const auto num_plans = static_cast<int64_t>(plans.size());
-  const Fields fields = read_fields(library, samples, view_of_sample);
+  const Fields fields = read_fields(library, samples, view_of_sample, kViewSide / side);
 
   const SurfaceValues clean = clean_surface(library, fields, samples);
   const AgedSurface aged = aged_surface(library, fields, samples, clean, num_plans);

@@ -1,5 +1,5 @@
-// Training samples out of the data: materials laid over baked views, aged as plans say, and lit, all as batched
-// tensor operations on any device.
+// Training samples out of the data: materials laid over baked views, aged as plans say, and lit, all as
+// batched tensor operations on any device.
 #pragma once
 
 #include <memory>
@@ -20,16 +20,19 @@ std::shared_ptr<const Library> make_library(const Dataset& dataset, c10::Device 
 
 /// B = number of plans × views a plan; samples of one plan follow each other. f32 on the library's device.
 struct Batch {
-  at::Tensor tile;      // [B,3,H,W] sRGB [0,1]: the clean render over the neutral backdrop, as views::tile_control
-  at::Tensor normal;    // [B,3,H,W] [0,1], as views::normal_control
-  at::Tensor target;    // [B,3,H,W] sRGB [0,1]: the aged render, same light and exposure
-  at::Tensor coverage;  // [B,1,H,W]
-  at::Tensor age_mask;  // [B,1,H,W] how much of the surface's colour the layers made up, [0,1]
+  at::Tensor
+      tile;  // [B,3,H,W] sRGB [0,1]: the clean render over the neutral backdrop, as views::tile_control
+  at::Tensor normal;                  // [B,3,H,W] [0,1], as views::normal_control
+  at::Tensor target;                  // [B,3,H,W] sRGB [0,1]: the aged render, same light and exposure
+  at::Tensor coverage;                // [B,1,H,W]
+  at::Tensor age_mask;                // [B,1,H,W] how much of the surface's colour the layers made up, [0,1]
   std::vector<std::string> captions;  // [B]
   std::vector<float> exposure_ev;     // [plans], in units of the object's mean light
 };
 
-/// Carries out plans that all have the same number of views. H = W = kViewSide. No gradients are recorded.
-Batch compose(const Library& library, std::span<const Plan> plans);
+/// Carries out plans that all have the same number of views. H = W = `side`, which is kViewSide, half or a
+/// quarter of it: planes and textures are averaged first, so that smaller samples cost less and do not alias.
+/// No gradients are recorded.
+Batch compose(const Library& library, std::span<const Plan> plans, int side = kViewSide);
 
 }  // namespace patina::mini_data

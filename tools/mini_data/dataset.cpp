@@ -39,7 +39,7 @@ const std::vector<PlanePrecision>& material_precision() {
 }
 
 uint8_t to_byte(float value) {
-  return static_cast<uint8_t>(std::lround(255.0f * glm::clamp(value, 0.0f, 1.0f)));
+  return static_cast<uint8_t>(255.0f * glm::clamp(value, 0.0f, 1.0f) + 0.5f);
 }
 
 void require(bool condition, const std::string& name, const std::string& what) {
@@ -109,7 +109,8 @@ MaterialData material_of(const Entry& entry, const std::string& name) {
   const PlaneStack stack = decoded(entry, name, kTextureSide, kTextureSide, kNumMaterialPlanes);
   material.planes.resize(kNumMaterialPlanes * kTexels);
   for (size_t i = 0; i < kTexels; ++i) {
-    const float luma = stack.planes[0][i], orange = stack.planes[1][i] - 0.5f, green = stack.planes[2][i] - 0.5f;
+    const float luma = stack.planes[0][i], orange = stack.planes[1][i] - 0.5f,
+                green = stack.planes[2][i] - 0.5f;
     material.planes[kBaseR * kTexels + i] = to_byte(luma + orange - green);
     material.planes[kBaseG * kTexels + i] = to_byte(luma + green);
     material.planes[kBaseB * kTexels + i] = to_byte(luma - orange - green);
@@ -126,8 +127,12 @@ Entry view_entry(const std::string& object, int index, const ViewData& camera,
   std::vector<float> rotation;
   for (int i = 0; i < 9; ++i) rotation.push_back(camera.world_from_camera[i / 3][i % 3]);
   Entry entry;
-  entry.meta = {{"kind", "view"},         {"name", object},  {"index", index}, {"world_from_camera", rotation},
-                {"distance", camera.distance}, {"fov_y", camera.fov_y}};
+  entry.meta = {{"kind", "view"},
+                {"name", object},
+                {"index", index},
+                {"world_from_camera", rotation},
+                {"distance", camera.distance},
+                {"fov_y", camera.fov_y}};
   entry.payload = encode_planes({kViewSide, kViewSide, planes}, view_precision());
   return entry;
 }
@@ -144,7 +149,8 @@ Entry object_entry(const ObjectData& object, const std::vector<std::vector<float
   return entry;
 }
 
-// Colour is turned into luma and two differences that undo exactly [Malvar2008]: most of a photograph's detail is luma.
+// Colour is turned into luma and two differences that undo exactly [Malvar2008]: most of a photograph's
+// detail is luma.
 Entry material_entry(const MaterialData& material, const std::vector<std::vector<float>>& planes,
                      const Json& credit) {
   PATINA_CHECK_EQ(planes.size(), static_cast<size_t>(kNumMaterialPlanes));
@@ -156,13 +162,10 @@ Entry material_entry(const MaterialData& material, const std::vector<std::vector
     coded[2][i] = 0.5f + 0.5f * (g - 0.5f * (r + b));
   }
   Entry entry;
-  entry.meta = {{"kind", "material"},
-                {"name", material.name},
-                {"class", material.material_class},
-                {"words", material.words},
-                {"held_out", material.held_out},
-                {"is_mask", material.is_mask},
-                {"credit", credit}};
+  entry.meta = {
+      {"kind", "material"},      {"name", material.name},         {"class", material.material_class},
+      {"words", material.words}, {"held_out", material.held_out}, {"is_mask", material.is_mask},
+      {"credit", credit}};
   entry.payload = encode_planes({kTextureSide, kTextureSide, coded}, material_precision());
   return entry;
 }
@@ -190,7 +193,8 @@ Dataset read_dataset(const fs::path& folder, Part part) {
       if (kind == "object") {
         ObjectData object = object_of(entry, name);
         if (!wanted(object.held_out)) continue;
-        require(object_at.emplace(object.name, out.objects.size()).second, name, "there are two of that name");
+        require(object_at.emplace(object.name, out.objects.size()).second, name,
+                "there are two of that name");
         out.objects.push_back(std::move(object));
       } else if (kind == "view") {
         // Views follow their object in the same shard; those of an object that was left out are left out too.

@@ -1,6 +1,7 @@
 // Random draws for the data tools: small helpers over the library's counter-based numbers.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 

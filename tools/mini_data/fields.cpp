@@ -47,7 +47,8 @@ std::shared_ptr<const Library> make_library(const Dataset& dataset, c10::Device 
   for (const MaterialData& material : dataset.materials)
     materials.push_back(bytes(material.planes, {kNumMaterialPlanes, kTextureSide, kTextureSide}));
   if (planes.empty()) throw Error(ErrorCode::kUsage, "data set", "holds no views");
-  if (materials.empty()) materials.push_back(at::full({kNumMaterialPlanes, kTextureSide, kTextureSide}, 128, at::kByte));
+  if (materials.empty())
+    materials.push_back(at::full({kNumMaterialPlanes, kTextureSide, kTextureSide}, 128, at::kByte));
 
   const auto num_views = static_cast<int64_t>(planes.size());
   out->planes = at::stack(planes).to(device);
@@ -100,12 +101,15 @@ Tensor noise_at(const Library& library, const Tensor& position, const Tensor& si
 }
 
 Fields read_fields(const Library& library, std::span<const Plan* const> samples,
-                   const std::vector<int64_t>& view_of_sample) {
+                   const std::vector<int64_t>& view_of_sample, int64_t reduction) {
   const Tensor index = at::tensor(view_of_sample, at::kLong).to(library.planes.device());
   std::vector<int64_t> objects;
   for (const Plan* plan : samples) objects.push_back(plan->object);
   const Tensor object_index = at::tensor(objects, at::kLong).to(library.planes.device());
-  const Tensor planes = library.planes.index_select(0, index).to(at::kFloat) / 255;
+  const auto reduced = [reduction](const Tensor& full) {
+    return reduction > 1 ? at::avg_pool2d(full, {reduction, reduction}, {reduction, reduction}) : full;
+  };
+  const Tensor planes = reduced(library.planes.index_select(0, index).to(at::kFloat) / 255);
   const auto plane = [&](int first, int count = 1) { return planes.slice(1, first, first + count); };
   const auto light = [&](int first, int count) {
     const Tensor code = plane(first, count).clamp_max(0.999).square();
@@ -113,19 +117,22 @@ Fields read_fields(const Library& library, std::span<const Plan* const> samples,
   };
 
   Fields out;
+  out.reduction = reduction;
   out.rotation = library.rotation.index_select(0, index);
   out.coverage = plane(kCoverage).contiguous();
   const Tensor distance = library.distance.index_select(0, index).view({-1, 1, 1, 1});
-  const Tensor focal = library.focal.index_select(0, index).view({-1, 1, 1, 1});
-  const Tensor depth = 2 * library.depth.index_select(0, index).unsqueeze(1) + distance - 1;
+  const Tensor focal = library.focal.index_select(0, index).view({-1, 1, 1, 1}) / reduction;
+  const Tensor depth = 2 * reduced(library.depth.index_select(0, index).unsqueeze(1)) + distance - 1;
   out.pixel_size = depth / focal;
 
-  // Rays through pixel centres in the camera's frame, then points at their depths. The cameras look at the origin.
+  // Rays through pixel centres in the camera's frame, then points at their depths. The cameras look at the
+  // origin.
   const int64_t side = planes.size(2);
   const Tensor steps = at::arange(side, planes.options()) + 0.5;
   const Tensor x = (steps - 0.5 * static_cast<double>(side)).view({1, 1, 1, side}) / focal;
   const Tensor y = (0.5 * static_cast<double>(side) - steps).view({1, 1, side, 1}) / focal;
-  const Tensor ray = at::cat({x.expand({-1, 1, side, side}), y.expand({-1, 1, side, side}), -at::ones_like(depth)}, 1);
+  const Tensor ray =
+      at::cat({x.expand({-1, 1, side, side}), y.expand({-1, 1, side, side}), -at::ones_like(depth)}, 1);
   const Tensor eye = out.rotation.select(2, 2).view({-1, 3, 1, 1}) * distance;
   out.position = rotated(out.rotation, (ray * depth).contiguous()) + eye;
   out.to_eye = rotated(out.rotation, (-ray / ray.norm(2, {1}, true)).contiguous());
@@ -147,7 +154,8 @@ Fields read_fields(const Library& library, std::span<const Plan* const> samples,
 
   const Tensor size = at::full({1, 1, 1, 1}, 0.16, planes.options());
   const Tensor shift = per_sample(samples, planes, 3, [](const Plan& plan, std::vector<float>& values) {
-    for (int c = 0; c < 3; ++c) values.push_back(static_cast<float>(plan.seed >> (16 * c) & 0xFFFF) / 65536.0f);
+    for (int c = 0; c < 3; ++c)
+      values.push_back(static_cast<float>(plan.seed >> (16 * c) & 0xFFFF) / 65536.0f);
   });
   out.detail = noise_at(library, out.position, size, shift);
   return out;

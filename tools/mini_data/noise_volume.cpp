@@ -76,7 +76,8 @@ std::vector<float> noise_volume() {
   for (size_t i = 0; i < kCount; ++i) {
     const vec3 p = (vec3(i % n, i / n % n, i / (n * n)) + 0.5f) / static_cast<float>(n);
     const float large = lattices[0](p), middle = lattices[1](p), small = lattices[2](p);
-    out[kClouds * kCount + i] = glm::clamp(0.5f + 0.75f * (large + 0.5f * middle + 0.25f * small), 0.0f, 1.0f);
+    out[kClouds * kCount + i] =
+        glm::clamp(0.5f + 0.75f * (large + 0.5f * middle + 0.25f * small), 0.0f, 1.0f);
     out[kFineClouds * kCount + i] = glm::clamp(0.5f + 0.8f * (0.6f * middle + 0.7f * small), 0.0f, 1.0f);
 
     const vec3 q = p * static_cast<float>(kNoiseCells);
@@ -86,7 +87,8 @@ std::vector<float> noise_volume() {
       for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx) {
           const ivec3 cell = base + ivec3(dx, dy, dz), wrapped = (cell + kNoiseCells) % kNoiseCells;
-          const Feature& f = features[static_cast<size_t>((wrapped.z * kNoiseCells + wrapped.y) * kNoiseCells + wrapped.x)];
+          const Feature& f =
+              features[static_cast<size_t>((wrapped.z * kNoiseCells + wrapped.y) * kNoiseCells + wrapped.x)];
           const float distance = glm::length(f.at + vec3(cell - wrapped) - q);
           if (distance < nearest) {
             second = nearest, nearest = distance, strength = f.strength;

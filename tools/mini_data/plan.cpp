@@ -12,9 +12,12 @@ namespace {
 
 Strength strength_of(Draw& draw, int level) {
   switch (level) {
-    case 0: return {0, draw(0.06f, 0.18f)};
-    case 1: return {1, draw(0.25f, 0.5f)};
-    default: return {2, draw(0.6f, 0.9f)};
+    case 0:
+      return {0, draw(0.06f, 0.18f)};
+    case 1:
+      return {1, draw(0.25f, 0.5f)};
+    default:
+      return {2, draw(0.6f, 0.9f)};
   }
 }
 
@@ -31,7 +34,8 @@ Plan begun(const Catalog& catalog, Draw& draw, uint64_t seed, const PlanOptions&
   const auto num_views = static_cast<int>(catalog.objects[static_cast<size_t>(plan.object)]->views.size());
   PATINA_CHECK(options.views >= 1);
   const int first = draw.below(num_views);
-  for (int i = 0; i < options.views; ++i) plan.views.push_back((first + i * std::max(num_views / options.views, 1)) % num_views);
+  for (int i = 0; i < options.views; ++i)
+    plan.views.push_back((first + i * std::max(num_views / options.views, 1)) % num_views);
   return plan;
 }
 
@@ -42,8 +46,11 @@ void divide(const Catalog& catalog, Draw& draw, Plan& plan) {
   if (which > 0.4f) return;
   plan.division = which < 0.25f ? Division::kBand : Division::kPatches;
   plan.clean[1] = any_clean(draw).surface(catalog, draw);
-  const float middle = draw(-0.6f, 0.6f), half = draw(0.06f, 0.35f);
-  plan.band_low = middle - half, plan.band_high = draw.chance(0.4f) ? 2.0f : middle + half;
+  // A belt, or all above some height; never most of the object.
+  const bool to_the_top = draw.chance(0.4f);
+  const float middle = draw(-0.6f, 0.6f), half = draw(0.06f, 0.25f);
+  plan.band_low = to_the_top ? draw(0.1f, 0.6f) : middle - half;
+  plan.band_high = to_the_top ? 2.0f : middle + half;
 }
 
 std::string object_word(const Catalog& catalog, Draw& draw, const Plan& plan) {
@@ -54,11 +61,16 @@ std::string object_word(const Catalog& catalog, Draw& draw, const Plan& plan) {
 
 void age(const Catalog& catalog, Draw& draw, const AgeRecipe& recipe, int level, Plan& plan) {
   const CleanRecipe* base = nullptr;
-  if (!recipe.remade_of.empty() && draw.chance(0.5f)) base = &clean_recipe(recipe.remade_of);  // it was that before already
-  else if (!recipe.bases.empty() && draw.chance(0.75f)) base = &clean_recipe(draw.of(recipe.bases));
-  else base = &any_clean(draw);
+  if (!recipe.remade_of.empty() && draw.chance(0.5f))
+    base = &clean_recipe(recipe.remade_of);  // it was that before already
+  else if (!recipe.bases.empty() && draw.chance(0.75f))
+    base = &clean_recipe(draw.of(recipe.bases));
+  else
+    base = &any_clean(draw);
   plan.clean[0] = base->surface(catalog, draw);
-  divide(catalog, draw, plan);
+  plan.clean[1] = plan.clean[0];
+  // What is of the asked material already stays so all over: the caption speaks of the whole object.
+  if (base->name != recipe.remade_of) divide(catalog, draw, plan);
   std::string material = draw.of(base->words);
   if (!recipe.remade_of.empty() && base->name != recipe.remade_of) {
     const CleanRecipe& other = clean_recipe(recipe.remade_of);
@@ -70,7 +82,8 @@ void age(const Catalog& catalog, Draw& draw, const AgeRecipe& recipe, int level,
   PATINA_CHECK_LE(plan.layers.size(), kMaxLayers);
   plan.asked_class = recipe.name;
   // Recipes that bring their material name it already.
-  plan.caption = aged_caption(draw, recipe, object_word(catalog, draw, plan), recipe.remade_of.empty() ? material : "", level, true);
+  plan.caption = aged_caption(draw, recipe, object_word(catalog, draw, plan),
+                              recipe.remade_of.empty() ? material : "", level);
 }
 
 void clean(const Catalog& catalog, Draw& draw, const CleanRecipe& recipe, bool remake, Plan& plan) {
@@ -84,13 +97,15 @@ void clean(const Catalog& catalog, Draw& draw, const CleanRecipe& recipe, bool r
     plan.clean[1] = plan.clean[0];
   }
   plan.asked_class = recipe.name;
-  plan.caption = clean_caption(draw, object_word(catalog, draw, plan), draw.of(recipe.words));
+  plan.caption =
+      clean_caption(draw, object_word(catalog, draw, plan), draw.of(recipe.words), recipe.asked_for);
 }
 
 }  // namespace
 
 Catalog catalog_of(const Dataset& dataset) {
-  if (dataset.objects.empty()) throw Error(ErrorCode::kUsage, "data set", "holds no objects to make samples of");
+  if (dataset.objects.empty())
+    throw Error(ErrorCode::kUsage, "data set", "holds no objects to make samples of");
   Catalog out;
   out.dataset = &dataset;
   for (size_t i = 0; i < dataset.materials.size(); ++i)

@@ -26,20 +26,20 @@ struct Surface {
   vec3 shift{0.0f};
 };
 
-/// Where something lies: the share `amount` of the visible surface on which a weighted sum of fields is largest.
-/// Fields are about in [0,1].
+/// Where something lies: the share `amount` of the visible surface on which a weighted sum of fields is
+/// largest. Fields are about in [0,1].
 struct Mask {
-  float edge = 0, edge_coarse = 0;    // convex edges, narrow and wide
-  float hollow = 0, hollow_coarse = 0;  // concave ones
-  float crevice = 0, shadow = 0;      // places that walls nearby, or anything, hide
-  float up = 0, down = 0, low = 0;    // facing up, facing down, near the ground
-  float flow = 0;                     // below ledges and crevices, in vertical streaks
+  float edge = 0, edge_coarse = 0;         // convex edges, narrow and wide
+  float hollow = 0, hollow_coarse = 0;     // concave ones
+  float crevice = 0, shadow = 0;           // places that walls nearby, or anything, hide
+  float up = 0, down = 0, low = 0;         // facing up, facing down, near the ground
+  float flow = 0;                          // below ledges and crevices, in vertical streaks
   float noise = 1, cells = 0, cracks = 0;  // cloudy; round spots; thin lines
-  float grunge = 0;                   // a photographed mask
-  float own_height = 0, base_height = 0;   // high places of the layer's texture; low places of what lies below
+  float grunge = 0;                        // a photographed mask
+  float own_height = 0, base_height = 0;  // high places of the layer's texture; low places of what lies below
   int grunge_material = -1;
-  float noise_size = 0.6f;            // of the largest clouds, cells and crack plates
-  float stretch = 1;                  // > 1: clouds are drawn out vertically
+  float noise_size = 0.6f;  // of the largest clouds, cells and crack plates
+  float stretch = 1;        // > 1: clouds are drawn out vertically
   float amount = 0.4f, softness = 0.05f;
   vec3 shift{0.0f};
 };
@@ -48,8 +48,8 @@ struct Layer {
   Surface surface;
   Mask mask;
   float opacity = 1;
-  float thickness = 0;      // rise at the mask's border, in radii; negative: something came off
-  float halo = 0;           // how strongly the surroundings are stained
+  float thickness = 0;                // rise at the mask's border, in radii; negative: something came off
+  float halo = 0;                     // how strongly the surroundings are stained
   vec3 halo_color{0.3f, 0.2f, 0.1f};  // sRGB
 };
 
@@ -58,16 +58,16 @@ enum class Division { kNone, kBand, kPatches };
 
 struct Plan {
   int object = 0;
-  std::vector<int> views;            // of the object
+  std::vector<int> views;  // of the object
   uint64_t seed = 0;
-  std::array<Surface, 2> clean;      // in the tile
+  std::array<Surface, 2> clean;  // in the tile
   Division division = Division::kNone;
   float band_low = 0, band_high = 0;  // heights between which the second lies
-  bool remade = false;               // the target has another material altogether:
+  bool remade = false;                // the target has another material altogether:
   Surface remade_of;
-  std::vector<Layer> layers;         // over the target, at most kMaxLayers; none: target and tile are alike
-  std::string caption;               // may be empty
-  std::string asked_class;           // what the caption asks for, e.g. "moss"; of a material or a kind of ageing
+  std::vector<Layer> layers;  // over the target, at most kMaxLayers; none: target and tile are alike
+  std::string caption;        // may be empty
+  std::string asked_class;    // what the caption asks for, e.g. "moss"; of a material or a kind of ageing
 };
 inline constexpr size_t kMaxLayers = 3;
 
@@ -81,7 +81,7 @@ struct Catalog {
 Catalog catalog_of(const Dataset& dataset);
 
 struct PlanOptions {
-  int views = 1;              // per sample; of the object's views, at equal steps of azimuth
+  int views = 1;               // per sample; of the object's views, at equal steps of azimuth
   float empty_caption = 0.1f;  // share, for guidance without a prompt
 };
 

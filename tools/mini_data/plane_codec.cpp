@@ -13,6 +13,7 @@ namespace {
 
 constexpr uint32_t kMagic = 0x31534C50;  // "PLS1"
 constexpr int kMaxSide = 4096, kMaxPlanes = 64;
+constexpr int kMaxLevel = 1 << 27;  // of a quantised coefficient
 constexpr int kBlock = 8, kBlockSize = 64;
 using Block = std::array<float, kBlockSize>;
 
@@ -128,7 +129,7 @@ class Reader {
 // signs. Written once for both directions: Coder is Writer (values go out) or Reader (values come in). ---
 
 struct Model {
-  std::array<Bit, 128> last;                      // a tree of seven binary decisions
+  std::array<Bit, 128> last;                           // a tree of seven binary decisions
   std::array<std::array<Bit, 3>, kBlockSize> is_zero;  // by place and by what came before
   std::array<std::array<Bit, 16>, 8> size;
   std::array<std::array<Bit, 32>, 2> exponent;
@@ -203,8 +204,10 @@ void code_block(Coder& coder, Model& model, std::array<int, kBlockSize>& levels)
     int& level = levels[static_cast<size_t>(order[static_cast<size_t>(i)])];
     const auto near = static_cast<size_t>(std::min(before, 2));
     bool zero = level == 0;
-    if (i + 1 < last) coder.code(model.is_zero[static_cast<size_t>(i)][near], zero);
-    else zero = false;
+    if (i + 1 < last)
+      coder.code(model.is_zero[static_cast<size_t>(i)][near], zero);
+    else
+      zero = false;
     int size = 0;
     if (!zero) {
       size = std::abs(level);
@@ -303,7 +306,8 @@ std::vector<uint8_t> encode_planes(const PlaneStack& stack, std::span<const Plan
     for_blocks(stack.width, stack.height, [&](int x0, int y0) {
       Block block;
       for (size_t i = 0; i < kBlockSize; ++i)
-        block[i] = plane[(static_cast<size_t>(y0) + i / kBlock) * width + static_cast<size_t>(x0) + i % kBlock];
+        block[i] =
+            plane[(static_cast<size_t>(y0) + i / kBlock) * width + static_cast<size_t>(x0) + i % kBlock];
       block = transformed(block, true);
       std::array<int, kBlockSize> levels;
       for (size_t i = 0; i < kBlockSize; ++i) {
@@ -325,13 +329,15 @@ std::vector<uint8_t> encode_planes(const PlaneStack& stack, std::span<const Plan
 PlaneStack decode_planes(std::span<const uint8_t> bytes, const std::string& name) {
   size_t at = 0;
   const auto take = [&]<class T>(T value) {
-    if (bytes.size() - at < sizeof(T)) throw Error(ErrorCode::kFormat, name, "the header of a plane stack ends early");
+    if (bytes.size() - at < sizeof(T))
+      throw Error(ErrorCode::kFormat, name, "the header of a plane stack ends early");
     std::memcpy(&value, bytes.data() + at, sizeof(T));
     at += sizeof(T);
     return value;
   };
   if (take(uint32_t{}) != kMagic)
-    throw Error(ErrorCode::kFormat, name, "expected a plane stack (its first bytes are PLS1), found something else");
+    throw Error(ErrorCode::kFormat, name,
+                "expected a plane stack (its first bytes are PLS1), found something else");
   PlaneStack stack;
   stack.width = take(uint16_t{});
   stack.height = take(uint16_t{});
@@ -362,12 +368,17 @@ PlaneStack decode_planes(std::span<const uint8_t> bytes, const std::string& name
       code_block(reader, model, levels);
       const int bx = x0 / kBlock, by = y0 / kBlock;
       levels[0] += predicted_mean(means, blocks_a_row, bx, by);
+      // Sums of damaged differences could otherwise grow past an int.
+      if (std::abs(levels[0]) > kMaxLevel)
+        throw Error(ErrorCode::kFormat, name, "a block's mean is out of range: make the data anew");
       means[static_cast<size_t>(by * blocks_a_row + bx)] = levels[0];
       Block block;
-      for (size_t i = 0; i < kBlockSize; ++i) block[i] = static_cast<float>(levels[i]) * step_at(precision[c], i);
+      for (size_t i = 0; i < kBlockSize; ++i)
+        block[i] = static_cast<float>(levels[i]) * step_at(precision[c], i);
       block = transformed(block, false);
       for (size_t i = 0; i < kBlockSize; ++i)
-        plane[(static_cast<size_t>(y0) + i / kBlock) * width + static_cast<size_t>(x0) + i % kBlock] = block[i];
+        plane[(static_cast<size_t>(y0) + i / kBlock) * width + static_cast<size_t>(x0) + i % kBlock] =
+            block[i];
     });
   }
   return stack;

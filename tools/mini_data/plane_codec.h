@@ -1,6 +1,7 @@
-// Compresses stacks of float planes (light, geometry, textures) into few bytes: an 8 × 8 cosine transform, one
-// step of quantisation a plane, adaptive range coding. Standard library only, so that a machine with a GPU and
-// nothing else can read the data; each plane chooses its own precision, which picture formats do not offer.
+// Compresses stacks of float planes (light, geometry, textures) into few bytes: an 8 × 8 cosine transform,
+// one step of quantisation a plane, adaptive range coding. Standard library only, so that a machine with a
+// GPU and nothing else can read the data; each plane chooses its own precision, which picture formats do not
+// offer.
 #pragma once
 
 #include <cstdint>

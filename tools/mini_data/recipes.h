@@ -40,8 +40,9 @@ const AgeRecipe& age_recipe(const std::string& name);
 const CleanRecipe& clean_recipe(const std::string& name);
 
 /// The words for a sample; see captions.cpp.
-std::string aged_caption(Draw& draw, const AgeRecipe& age, const std::string& object, const std::string& material,
-                         int level, bool others_too);
-std::string clean_caption(Draw& draw, const std::string& object, const std::string& material);
+std::string aged_caption(Draw& draw, const AgeRecipe& age, const std::string& object,
+                         const std::string& material, int level);
+/// `is_noun`: whether an object can be made of it ("stone"), or only be so ("painted").
+std::string clean_caption(Draw& draw, const std::string& object, const std::string& material, bool is_noun);
 
 }  // namespace patina::mini_data

@@ -64,8 +64,9 @@ std::vector<Entry> read_shard(const std::filesystem::path& path) {
     if (size > bytes.size() - at)
       bad(path, "the payload of " + item["name"].get<std::string>() + " should be " + std::to_string(size) +
                     " bytes long, but " + std::to_string(bytes.size() - at) + " are left");
-    out.push_back({item, {bytes.begin() + static_cast<ptrdiff_t>(at),
-                          bytes.begin() + static_cast<ptrdiff_t>(at + size)}});
+    out.push_back(
+        {item,
+         {bytes.begin() + static_cast<ptrdiff_t>(at), bytes.begin() + static_cast<ptrdiff_t>(at + size)}});
     at += size;
   }
   if (at != bytes.size()) bad(path, "bytes are left after the last payload");

@@ -8,7 +8,8 @@
 
 namespace patina::mini_data {
 
-SurfaceValues clean_surface(const Library& library, const Fields& fields, std::span<const Plan* const> samples);
+SurfaceValues clean_surface(const Library& library, const Fields& fields,
+                            std::span<const Plan* const> samples);
 
 /// The target's surface.
 struct AgedSurface {
