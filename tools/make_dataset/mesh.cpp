@@ -123,42 +123,57 @@ std::vector<vec3> face_normals(const Mesh& mesh) {
   return out;
 }
 
-// Diffuses per-vertex values by their areas until a point has spread over about `radius`.
-std::vector<float> spread(const Mesh& mesh, const Neighbours& near, const std::vector<float>& area,
-                          std::vector<float> value, float radius) {
-  // The shortest side of triangles counts: long thin ones would hardly spread across.
-  double edge = 0;
-  for (const uvec3& t : mesh.triangles) {
-    const vec3 &a = mesh.positions[t.x], &b = mesh.positions[t.y], &c = mesh.positions[t.z];
-    edge += std::min({glm::length(a - b), glm::length(b - c), glm::length(c - a)});
-  }
-  edge /= std::max<double>(1, static_cast<double>(mesh.triangles.size()));
-  // A step moves half of a value one edge away: variance grows by edge² / 2 a step. A few steps at least,
-  // since curvature sits on edges and the vertices of a triangle get unequal parts.
-  const int steps = std::clamp(static_cast<int>(2.0 * square(radius / static_cast<float>(edge))), 6, 120);
-  std::vector<float> next(value.size());
-  for (int step = 0; step < steps; ++step) {
+// Diffuses per-vertex sums until a point has spread by a standard deviation of about `radius`. Neighbours
+// weigh by one over their squared distance, and each vertex moves what makes its variance grow alike, so that
+// long thin triangles spread no farther along than across.
+std::vector<double> spread(const Mesh& mesh, const Neighbours& near, std::vector<double> value,
+                           float radius) {
+  constexpr int kSteps = 24;
+  std::vector<double> weight(near.list.size()), next(value.size());
+  for (size_t i = 0; i < value.size(); ++i)
+    for (uint32_t k = near.first[i]; k < near.first[i + 1]; ++k) {
+      const vec3 apart = mesh.positions[i] - mesh.positions[near.list[k]];
+      weight[k] = 1.0 / std::max(static_cast<double>(glm::dot(apart, apart)), 1e-8);
+    }
+  for (int step = 0; step < kSteps; ++step) {
     for (size_t i = 0; i < value.size(); ++i) {
-      double sum = 0, weight = 0;
+      double sum = 0, total = 0;
       for (uint32_t k = near.first[i]; k < near.first[i + 1]; ++k) {
-        const uint32_t j = near.list[k];
-        sum += static_cast<double>(area[j]) * value[j];
-        weight += area[j];
+        sum += weight[k] * value[near.list[k]];
+        total += weight[k];
       }
-      next[i] = weight > 0 ? 0.5f * value[i] + 0.5f * static_cast<float>(sum / weight) : value[i];
+      next[i] = value[i];
+      if (!(total > 0)) continue;
+      // Moving everything adds the variance Σ w d² / Σ w = n / Σ w. Where edges are far shorter than the
+      // radius no more than most of a value moves in a step, and it spreads less far: there the mesh is dense
+      // and smooth.
+      const double variance = (near.first[i + 1] - near.first[i]) / total;
+      const double moved = std::min(0.8, static_cast<double>(square(radius)) / (kSteps * variance));
+      next[i] = (1 - moved) * value[i] + moved * sum / total;
     }
     value.swap(next);
   }
   return value;
 }
 
-// Mean curvature times two from the angles between faces [Cohen-Steiner2003, Sec. 3.4]: Σ |e| θ_e / area,
-// positive where convex. It holds for rounded and for sharp edges alike.
-std::vector<float> bending(const Mesh& mesh, const std::vector<vec3>& normals,
-                           const std::vector<float>& area) {
+// The mean over `radius` of what `sums` gives per area: both are spread, then divided, so that a vertex with
+// little area counts little.
+std::vector<float> mean_over(const Mesh& mesh, const Neighbours& near, const std::vector<double>& sums,
+                             const std::vector<double>& area, float radius) {
+  const auto above = spread(mesh, near, sums, radius), below = spread(mesh, near, area, radius);
+  std::vector<float> out;
+  for (size_t i = 0; i < above.size(); ++i)
+    out.push_back(below[i] > 0 ? static_cast<float>(above[i] / below[i]) : 0.0f);
+  return out;
+}
+
+// Mean curvature times two, summed over each vertex' area, from the angles between faces [Cohen-Steiner2003,
+// Sec. 3.4]: Σ |e| θ_e, half to each end, positive where convex. It holds for rounded and for sharp edges
+// alike.
+std::vector<double> bending(const Mesh& mesh, const std::vector<vec3>& normals) {
   std::map<std::pair<uint32_t, uint32_t>, std::pair<size_t, uint32_t>>
       open;  // edge → first triangle, its far corner
-  std::vector<float> sum(mesh.positions.size());
+  std::vector<double> sum(mesh.positions.size());
   for (size_t f = 0; f < mesh.triangles.size(); ++f) {
     const uvec3& t = mesh.triangles[f];
     for (int i = 0; i < 3; ++i) {
@@ -178,13 +193,12 @@ std::vector<float> bending(const Mesh& mesh, const std::vector<vec3>& normals,
             glm::dot(n1, mesh.positions[at->second.second] - mesh.positions[a]) < 0.0f ? 1.0f : -1.0f;
         const float share =
             0.5f * side * std::min(angle, 2.0f) * glm::length(mesh.positions[a] - mesh.positions[b]);
-        sum[a] += share;
-        sum[b] += share;
+        sum[a] += static_cast<double>(share);
+        sum[b] += static_cast<double>(share);
       }
       open.erase(at);
     }
   }
-  for (size_t i = 0; i < sum.size(); ++i) sum[i] = area[i] > 0 ? sum[i] / area[i] : 0.0f;
   return sum;
 }
 
@@ -198,7 +212,7 @@ std::vector<float> flow_of(const Mesh& mesh, const Neighbours& near, const std::
                    [&](uint32_t a, uint32_t b) { return mesh.positions[a].y > mesh.positions[b].y; });
   std::vector<float> flow(mesh.positions.size());
   for (const uint32_t i : from_top) {
-    const float source = glm::smoothstep(1.5f, 8.0f, std::abs(bend[i])) * (bend[i] < 0 ? 1.0f : 0.8f);
+    const float source = glm::smoothstep(5.0f, 14.0f, std::abs(bend[i])) * (bend[i] < 0 ? 1.0f : 0.8f);
     double arriving = 0, weight = 0;
     for (uint32_t k = near.first[i]; k < near.first[i + 1]; ++k) {
       const uint32_t j = near.list[k];
@@ -252,22 +266,22 @@ Finished finished(const Mesh& raw, float crease) {
   const std::vector<vec3> faces = face_normals(mesh);
   const size_t num_vertices = mesh.positions.size();
 
-  std::vector<float> area(num_vertices);
+  std::vector<double> area(num_vertices);
   std::vector<vec3> smooth(num_vertices);
   std::vector<std::vector<uint32_t>> faces_of(num_vertices);
   for (size_t f = 0; f < faces.size(); ++f)
     for (int i = 0; i < 3; ++i) {
       const uint32_t v = mesh.triangles[f][i];
-      area[v] += glm::length(faces[f]) / 6.0f;
+      area[v] += static_cast<double>(glm::length(faces[f])) / 6.0;
       smooth[v] += faces[f];
       faces_of[v].push_back(static_cast<uint32_t>(f));
     }
   for (vec3& n : smooth) n = glm::length(n) > 0 ? glm::normalize(n) : vec3(0, 1, 0);
 
   const Neighbours near = neighbours_of(mesh);
-  const std::vector<float> bend = bending(mesh, faces, area);
-  std::vector<float> fine = spread(mesh, near, area, bend, 0.025f);
-  std::vector<float> coarse = spread(mesh, near, area, bend, 0.09f);
+  const std::vector<double> bend = bending(mesh, faces);
+  std::vector<float> fine = mean_over(mesh, near, bend, area, 0.025f);
+  std::vector<float> coarse = mean_over(mesh, near, bend, area, 0.09f);
   const std::vector<float> flow = flow_of(mesh, near, fine, smooth);
   // A right angle spread over its radius ends near the limits; a sphere of the object's size stays near the
   // middle.

@@ -71,7 +71,18 @@ Mesh superellipsoid(const vec3& half, float e_vertical, float e_horizontal) {
   });
 }
 
-Mesh lathe(const std::vector<vec2>& profile, int flutes, float flute_depth) {
+// Long pieces of the profile are cut, so that triangles come out about as long as wide and carry curvature
+// evenly.
+Mesh lathe(const std::vector<vec2>& outline, int flutes, float flute_depth) {
+  constexpr float kLongest = 0.06f;
+  std::vector<vec2> profile{outline.front()};
+  for (size_t i = 1; i < outline.size(); ++i) {
+    const int pieces =
+        std::max(1, static_cast<int>(std::ceil(glm::length(outline[i] - outline[i - 1]) / kLongest)));
+    for (int k = 1; k <= pieces; ++k)
+      profile.push_back(
+          glm::mix(outline[i - 1], outline[i], static_cast<float>(k) / static_cast<float>(pieces)));
+  }
   const int steps = std::max(96, 12 * flutes);
   const auto last = static_cast<float>(profile.size() - 1);
   return grid(steps, static_cast<int>(profile.size()) - 1, [&](float u, float v) {
