@@ -129,7 +129,6 @@ bool pack_keys_values(const Arguments& a, Packing packing, const PackedSizes& si
       const uint16_t* rows = v_in + j0 * a.v_strides.token;
       transpose(rows, a.v_strides.token, count, dim, to, 32);
       std::fill(to + dim * 32, to + dim * 32 + count, bf16_of_float(1.0f));
-      std::fill(to + dim * 32 + count, to + dim * 32 + 32, uint16_t{0});
       std::memset(to + (dim + 1) * 32, 0, static_cast<size_t>(value_dim - dim - 1) * 64);
     }
   } else {
