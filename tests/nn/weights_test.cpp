@@ -74,7 +74,8 @@ TEST_F(Weights, reads_tensors_of_any_alignment) {
 
 TEST_F(Weights, names_all_that_is_missing_and_misshapen_at_once) {
   const SafeTensors file(path());
-  WeightReader reader(file, at::kFloat);
+  FileWeights source(file);
+  WeightReader reader(source, at::kFloat);
   reader.take("a.weight", {3, 2});
   reader.take("a.bias", {3});
   EXPECT_EQ(reader.take("b.weight", {4, 5}).sizes(), at::IntArrayRef({4, 5}));
@@ -86,11 +87,12 @@ TEST_F(Weights, names_all_that_is_missing_and_misshapen_at_once) {
 
 TEST_F(Weights, refuses_tensors_that_nobody_asked_for_unless_they_are_known) {
   const SafeTensors file(path());
-  WeightReader reader(file, at::kFloat);
+  FileWeights source(file);
+  WeightReader reader(source, at::kFloat);
   reader.take("a.weight", {2, 3});
   reader.take("a.bias", {3});
   EXPECT_NE(finish_message(reader).find(
-                "1 tensors do not belong to the network that config.json describes: ids [2]"),
+                "1 tensors do not belong to the network that config.json describes: ids"),
             std::string::npos);
   reader.ignore("ids");
   EXPECT_EQ(finish_message(reader), "fits");

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "patina/base/error.h"
+#include "patina/diffusion/component.h"
 #include "patina/diffusion/detail.h"
 #include "patina/diffusion/unet.h"
 #include "patina/nn/safetensors.h"

@@ -3,6 +3,7 @@
 #include <ATen/ATen.h>
 
 #include "patina/base/check.h"
+#include "patina/diffusion/component.h"
 
 namespace patina::diffusion {
 namespace {
@@ -34,10 +35,8 @@ at::Tensor ConditionEmbedding::operator()(const at::Tensor& condition, const nn:
   return record(name, conv_out(h, record));
 }
 
-ControlNet::ControlNet(const std::filesystem::path& folder, at::ScalarType type)
-    : type_(type), config_(read_controlnet_config(folder)) {
-  const nn::SafeTensors file(weight_file(folder));
-  nn::WeightReader weights(file, type);
+ControlNet::ControlNet(const ControlNetConfig& config, nn::WeightReader& weights)
+    : type_(weights.type()), config_(config) {
   encoder_ = load_encoder(weights, config_.unet);
   condition_embedding_ = load_condition_embedding(weights, config_);
   const std::vector<int64_t> channels = skip_channels(config_.unet);
@@ -47,9 +46,11 @@ ControlNet::ControlNet(const std::filesystem::path& folder, at::ScalarType type)
   }
   controlnet_mid_block_ =
       nn::load_conv2d(weights, "controlnet_mid_block", channels.back(), channels.back(), 1);
-  weights.finish();
   num_parameters_ = weights.num_parameters();
 }
+
+ControlNet::ControlNet(const std::filesystem::path& folder, at::ScalarType type)
+    : ControlNet(load_network<ControlNet>(read_controlnet_config(folder), folder, type)) {}
 
 at::Tensor ControlNet::hint(const at::Tensor& condition, const nn::Recorder& record) const {
   PATINA_CHECK_EQ(condition.dim(), 4);

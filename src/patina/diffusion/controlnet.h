@@ -18,6 +18,8 @@ struct ConditionEmbedding {
 
 class ControlNet {
  public:
+  /// Takes its tensors from `weights`; what does not fit, weights.finish() tells.
+  ControlNet(const ControlNetConfig& config, nn::WeightReader& weights);
   /// Reads <folder>/config.json and the weights beside it, as `type`. Throws Error.
   ControlNet(const std::filesystem::path& folder, at::ScalarType type);
 

@@ -9,6 +9,7 @@
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/parallel.h"
+#include "patina/diffusion/component.h"
 
 namespace patina::diffusion {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "patina/base/check.h"
 #include "patina/base/error.h"
-#include "patina/diffusion/unet.h"
+#include "patina/diffusion/component.h"
 
 namespace patina::diffusion {
 namespace {
@@ -36,7 +36,7 @@ at::Tensor TextAttention::operator()(const at::Tensor& x, const nn::Recorder& re
   const at::Tensor q = heads_first(q_proj(x, record)) / std::sqrt(static_cast<double>(head_dim));
   const at::Tensor k = heads_first(k_proj(x, record)), v = heads_first(v_proj(x, record));
   // Scores [B,heads,T,T]; T is 77, so nothing is gained by not materialising them.
-  const at::Tensor later = at::ones({tokens, tokens}, at::kBool).triu(1);
+  const at::Tensor later = at::ones({tokens, tokens}, x.options().dtype(at::kBool)).triu(1);
   const at::Tensor scores =
       at::matmul(q, k.transpose(2, 3)).masked_fill(later, -std::numeric_limits<double>::infinity());
   const at::Tensor attended = at::matmul(at::softmax(scores, -1), v);
@@ -54,10 +54,7 @@ at::Tensor TextLayer::operator()(const at::Tensor& x, const nn::Recorder& record
   return record(name, h + mlp(layer_norm2(h, record), record));
 }
 
-TextEncoder::TextEncoder(const std::filesystem::path& folder, at::ScalarType type)
-    : config_(read_text_encoder_config(folder)) {
-  const nn::SafeTensors file(weight_file(folder));
-  nn::WeightReader weights(file, type);
+TextEncoder::TextEncoder(const TextEncoderConfig& config, nn::WeightReader& weights) : config_(config) {
   const std::string root = "text_model.";
   token_embedding_ =
       weights.take(root + "embeddings.token_embedding.weight", {config_.vocab_size, config_.hidden_size});
@@ -73,9 +70,11 @@ TextEncoder::TextEncoder(const std::filesystem::path& folder, at::ScalarType typ
                            "vision_model.", "visual_projection"}) {
     weights.ignore(name);
   }
-  weights.finish();
   num_parameters_ = weights.num_parameters();
 }
+
+TextEncoder::TextEncoder(const std::filesystem::path& folder, at::ScalarType type)
+    : TextEncoder(load_network<TextEncoder>(read_text_encoder_config(folder), folder, type)) {}
 
 TextEncoding TextEncoder::operator()(const at::Tensor& ids, int64_t clip_skip,
                                      const nn::Recorder& record) const {
@@ -99,7 +98,7 @@ TextEncoding TextEncoder::operator()(const at::Tensor& ids, int64_t clip_skip,
   constexpr int64_t kWrongEos = 2;
   const at::Tensor end =
       config_.eos_token_id == kWrongEos ? ids.argmax(1) : ids.eq(config_.eos_token_id).to(at::kInt).argmax(1);
-  return {h, h.index({at::arange(ids.size(0)), end})};
+  return {h, h.index({at::arange(ids.size(0), ids.options()), end})};
 }
 
 }  // namespace patina::diffusion

@@ -44,6 +44,8 @@ struct TextEncoding {
 
 class TextEncoder {
  public:
+  /// Takes its tensors from `weights`; what does not fit, weights.finish() tells.
+  TextEncoder(const TextEncoderConfig& config, nn::WeightReader& weights);
   /// Reads <folder>/config.json and the weights beside it, as `type`. Throws Error.
   TextEncoder(const std::filesystem::path& folder, at::ScalarType type);
 

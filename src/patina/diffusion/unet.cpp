@@ -5,7 +5,7 @@
 #include <ATen/ATen.h>
 
 #include "patina/base/check.h"
-#include "patina/base/error.h"
+#include "patina/diffusion/component.h"
 
 namespace patina::diffusion {
 namespace {
@@ -79,7 +79,7 @@ at::Tensor timestep_embedding(const at::Tensor& timesteps, int64_t width, bool f
                               double freq_shift) {
   const int64_t half = width / 2;
   const at::Tensor exponents =
-      -std::log(10000.0) * at::arange(half, at::kFloat) / (static_cast<double>(half) - freq_shift);
+      -std::log(10000.0) * at::arange(half, timesteps.options().dtype(at::kFloat)) / (static_cast<double>(half) - freq_shift);
   const at::Tensor angles = timesteps.to(at::kFloat).unsqueeze(1) * at::exp(exponents).unsqueeze(0);
   const at::Tensor sines = at::sin(angles), cosines = at::cos(angles);
   const at::Tensor embedding = flip_sin_to_cos ? at::cat({cosines, sines}, 1) : at::cat({sines, cosines}, 1);
@@ -144,19 +144,18 @@ Encoder::Outputs Encoder::operator()(const at::Tensor& x, const Conditions& cond
   return outputs;
 }
 
-UNet::UNet(const std::filesystem::path& folder, at::ScalarType type) : type_(type) {
-  const UNetConfig config = read_unet_config(folder);
-  const nn::SafeTensors file(weight_file(folder));
-  nn::WeightReader weights(file, type);
+UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.type()) {
   encoder_ = load_encoder(weights, config);
   for (size_t i = 0; i < config.levels.size(); ++i) up_blocks_.push_back(load_up_block(weights, i, config));
   const int64_t finest = config.levels.front().channels;
   conv_norm_out_ =
       nn::load_group_norm(weights, "conv_norm_out", finest, config.norm_num_groups, config.norm_epsilon);
   conv_out_ = nn::load_conv2d(weights, "conv_out", finest, config.out_channels, config.conv_out_kernel);
-  weights.finish();
   num_parameters_ = weights.num_parameters();
 }
+
+UNet::UNet(const std::filesystem::path& folder, at::ScalarType type)
+    : UNet(load_network<UNet>(read_unet_config(folder), folder, type)) {}
 
 at::Tensor UNet::operator()(const UNetInputs& inputs, const nn::Recorder& record) const {
   const UNetConfig& config = encoder_.config;
@@ -189,20 +188,6 @@ at::Tensor UNet::operator()(const UNetInputs& inputs, const nn::Recorder& record
     record(block.name, h);
   }
   return conv_out_(nn::silu(conv_norm_out_(h, record)), record);
-}
-
-std::filesystem::path weight_file(const std::filesystem::path& folder) {
-  namespace fs = std::filesystem;
-  for (const char* name : {"diffusion_pytorch_model.safetensors", "model.safetensors",
-                           "diffusion_pytorch_model.fp16.safetensors", "model.fp16.safetensors"}) {
-    if (fs::exists(folder / name)) return folder / name;
-  }
-  for (const char* name : {"diffusion_pytorch_model.bin", "pytorch_model.bin",
-                           "diffusion_pytorch_model.fp16.bin", "pytorch_model.fp16.bin"}) {
-    if (fs::exists(folder / name)) nn::refuse_pickle_name(folder / name);
-  }
-  throw Error(ErrorCode::kNotFound, folder.string(),
-              "holds no weights; expected diffusion_pytorch_model.safetensors or model.safetensors");
 }
 
 }  // namespace patina::diffusion

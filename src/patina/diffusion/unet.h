@@ -77,6 +77,8 @@ struct UNetInputs {
 
 class UNet {
  public:
+  /// Takes its tensors from `weights`; what does not fit, weights.finish() tells.
+  UNet(const UNetConfig& config, nn::WeightReader& weights);
   /// Reads <folder>/config.json and the weights beside it, as `type` (f32 or bf16). Throws Error.
   UNet(const std::filesystem::path& folder, at::ScalarType type);
 
@@ -96,9 +98,5 @@ class UNet {
   nn::GroupNorm conv_norm_out_;
   nn::Conv2d conv_out_;
 };
-
-/// The weight file of one component's folder. Throws Error{kNotFound} that says what was looked for, and
-/// refuses pickles.
-std::filesystem::path weight_file(const std::filesystem::path& folder);
 
 }  // namespace patina::diffusion

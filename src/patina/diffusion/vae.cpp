@@ -3,7 +3,7 @@
 #include <ATen/ATen.h>
 
 #include "patina/base/check.h"
-#include "patina/diffusion/unet.h"
+#include "patina/diffusion/component.h"
 
 namespace patina::diffusion {
 namespace {
@@ -121,19 +121,18 @@ at::Tensor VaeBlock::operator()(const at::Tensor& x, const nn::Recorder& record)
   return record(name, h);
 }
 
-Vae::Vae(const std::filesystem::path& folder, at::ScalarType type)
-    : type_(type), config_(read_vae_config(folder)) {
-  const nn::SafeTensors file(weight_file(folder));
-  nn::WeightReader weights(file, type);
+Vae::Vae(const VaeConfig& config, nn::WeightReader& weights) : type_(weights.type()), config_(config) {
   encoder_ = load_vae_encoder(weights, config_);
   const int64_t latent = config_.latent_channels;
   if (config_.quant_conv) quant_conv_ = nn::load_conv2d(weights, "quant_conv", 2 * latent, 2 * latent, 1);
   if (config_.post_quant_conv)
     post_quant_conv_ = nn::load_conv2d(weights, "post_quant_conv", latent, latent, 1);
   decoder_ = load_vae_decoder(weights, config_);
-  weights.finish();
   num_parameters_ = weights.num_parameters();
 }
+
+Vae::Vae(const std::filesystem::path& folder, at::ScalarType type)
+    : Vae(load_network<Vae>(read_vae_config(folder), folder, type)) {}
 
 Posterior Vae::encode(const at::Tensor& image, const nn::Recorder& record) const {
   PATINA_CHECK_EQ(image.dim(), 4);

@@ -59,6 +59,8 @@ struct Posterior {
 
 class Vae {
  public:
+  /// Takes its tensors from `weights`; what does not fit, weights.finish() tells.
+  Vae(const VaeConfig& config, nn::WeightReader& weights);
   /// Reads <folder>/config.json and the weights beside it, with today's or the older attention names. Throws
   /// Error.
   Vae(const std::filesystem::path& folder, at::ScalarType type);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <ATen/ATen.h>
+#include <torch/version.h>
 
 #include "patina/base/check.h"
 #include "patina/base/error.h"
@@ -32,6 +33,22 @@ at::Tensor attend_cpu(const at::Tensor& q, const at::Tensor& k, const at::Tensor
   arguments.beta = bias.beta;
   attention::attention_cpu(arguments);
   return out;
+}
+
+/// The plain formula, for training: the kernels record no gradients.
+at::Tensor attend_recorded(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads) {
+  const auto heads_first = [&](const at::Tensor& x) {
+    return x.view({x.size(0), x.size(1), num_heads, x.size(2) / num_heads}).transpose(1, 2);
+  };
+  const at::Tensor q_heads = heads_first(q), k_heads = heads_first(k), v_heads = heads_first(v);
+#if TORCH_VERSION_MAJOR >= 2
+  const at::Tensor attended = at::scaled_dot_product_attention(q_heads, k_heads, v_heads);
+#else
+  const double scale = 1 / std::sqrt(static_cast<double>(q_heads.size(3)));
+  const at::Tensor weights = at::softmax(at::matmul(q_heads * scale, k_heads.transpose(2, 3)), -1);
+  const at::Tensor attended = at::matmul(weights, v_heads);
+#endif
+  return attended.transpose(1, 2).reshape(q.sizes());
 }
 
 }  // namespace
@@ -73,6 +90,10 @@ at::Tensor attend(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v,
   PATINA_CHECK(q.scalar_type() == k.scalar_type() && q.scalar_type() == v.scalar_type());
   PATINA_CHECK(q.device() == k.device() && q.device() == v.device());
   PATINA_CHECK(q.stride(2) == 1 && k.stride(2) == 1 && v.stride(2) == 1);
+  if (at::GradMode::is_enabled() && (q.requires_grad() || k.requires_grad() || v.requires_grad())) {
+    PATINA_CHECK(!bias.buckets);
+    return attend_recorded(q, k, v, num_heads);
+  }
   return q.is_cuda() ? attend_cuda(q, k, v, num_heads, bias) : attend_cpu(q, k, v, num_heads, bias);
 }
 

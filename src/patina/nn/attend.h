@@ -41,7 +41,8 @@ struct SelfAttentionBias {
 
 /// softmax(q kᵀ/√d + β[j ∈ S_i]) v for q [B,N,heads·d], k and v [B,M,heads·d] -> [B,N,heads·d]; one dtype,
 /// f32 or bf16, on CUDA fp16 too. With a bias N = M = its number of pixels, and on CUDA d is a multiple of 8
-/// up to 256, the dtype bf16 or fp16 and β at least -1. Memory beyond the result is O(N + M).
+/// up to 256, the dtype bf16 or fp16 and β at least -1. Memory beyond the result is O(N + M). Where gradients
+/// are recorded there must be no bias, and memory may be O(N M).
 at::Tensor attend(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
                   const LevelBias& bias = {});
 

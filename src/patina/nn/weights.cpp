@@ -70,20 +70,31 @@ at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::Sc
   return bytes.clone().view(stored).view(entry.shape).to(type);
 }
 
-at::Tensor WeightReader::take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type) {
+at::Tensor FileWeights::find(const std::string& name, at::IntArrayRef, at::ScalarType type) {
   const TensorEntry* entry = file_.find(name);
-  if (!entry) {
+  return entry ? read_tensor(file_, *entry, type) : at::Tensor();
+}
+
+std::vector<std::string> FileWeights::names() const {
+  std::vector<std::string> names;
+  for (const TensorEntry& entry : file_.tensors()) names.push_back(entry.name);
+  return names;
+}
+
+at::Tensor WeightReader::take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type) {
+  const at::Tensor tensor = source_.find(name, shape, type);
+  if (!tensor.defined()) {
     missing_.push_back(name + " " + shape_text(shape));
     return at::zeros(shape, type);
   }
   taken_.push_back(name);
-  if (entry->shape != shape) {
-    misshapen_.push_back(name + " (expected " + shape_text(shape) + ", found " + shape_text(entry->shape) +
+  if (tensor.sizes() != shape) {
+    misshapen_.push_back(name + " (expected " + shape_text(shape) + ", found " + shape_text(tensor.sizes()) +
                          ")");
     return at::zeros(shape, type);
   }
-  num_parameters_ += entry->num_elements();
-  return read_tensor(file_, *entry, type);
+  num_parameters_ += tensor.numel();
+  return tensor;
 }
 
 void WeightReader::finish() const {
@@ -97,19 +108,17 @@ void WeightReader::finish() const {
     // A tensor too many means that the configuration describes another network than the weights.
     const std::set<std::string> taken(taken_.begin(), taken_.end());
     std::vector<std::string> unused;
-    for (const TensorEntry& entry : file_.tensors()) {
-      const bool known = std::any_of(ignored_.begin(), ignored_.end(), [&](const std::string& prefix) {
-        return entry.name.starts_with(prefix);
-      });
-      if (!known && !taken.contains(entry.name))
-        unused.push_back(printable(entry.name, 80) + " " + shape_text(entry.shape));
+    for (const std::string& name : source_.names()) {
+      const bool known = std::any_of(ignored_.begin(), ignored_.end(),
+                                     [&](const std::string& prefix) { return name.starts_with(prefix); });
+      if (!known && !taken.contains(name)) unused.push_back(printable(name, 80));
     }
     if (!unused.empty()) {
       add(std::to_string(unused.size()) +
           " tensors do not belong to the network that config.json describes: " + list_text(unused));
     }
   }
-  if (!text.empty()) throw Error(ErrorCode::kFormat, file_.path().string(), text);
+  if (!text.empty()) throw Error(ErrorCode::kFormat, source_.where(), text);
 }
 
 }  // namespace patina::nn

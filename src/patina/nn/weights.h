@@ -17,20 +17,46 @@ namespace patina::nn {
 /// F16, BF16 or F64 if `type` is a floating type; otherwise integers become `type` too.
 at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::ScalarType type);
 
+/// Where the tensors of a network come from.
+class WeightSource {
+ public:
+  virtual ~WeightSource() = default;
+  /// For messages: the file.
+  virtual std::string where() const = 0;
+  virtual bool has(const std::string& name) const = 0;
+  /// The tensor as `type` in the shape it is stored in; undefined if there is none. `expected` is the shape
+  /// that the network asks for.
+  virtual at::Tensor find(const std::string& name, at::IntArrayRef expected, at::ScalarType type) = 0;
+  virtual std::vector<std::string> names() const = 0;
+};
+
+/// A weight file. `file` must outlive it, not the tensors.
+class FileWeights final : public WeightSource {
+ public:
+  explicit FileWeights(const SafeTensors& file) : file_(file) {}
+  std::string where() const override { return file_.path().string(); }
+  bool has(const std::string& name) const override { return file_.find(name) != nullptr; }
+  at::Tensor find(const std::string& name, at::IntArrayRef expected, at::ScalarType type) override;
+  std::vector<std::string> names() const override;
+
+ private:
+  const SafeTensors& file_;
+};
+
 /// Hands out the tensors of one network and keeps account of what does not fit.
 ///
 /// take() never fails at once: what is missing or wrongly shaped is noted and zeros are returned, so that
 /// finish() can name all of it in one message.
 class WeightReader {
  public:
-  /// Tensors become `type`. `file` must outlive the reader, not the tensors.
-  WeightReader(const SafeTensors& file, at::ScalarType type) : file_(file), type_(type) {}
+  /// Tensors become `type`. `source` must outlive the reader, not the tensors.
+  WeightReader(WeightSource& source, at::ScalarType type) : source_(source), type_(type) {}
 
   at::Tensor take(const std::string& name, std::vector<int64_t> shape) {
     return take(name, std::move(shape), type_);
   }
   at::Tensor take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type);
-  bool has(const std::string& name) const { return file_.find(name) != nullptr; }
+  bool has(const std::string& name) const { return source_.has(name); }
   at::ScalarType type() const { return type_; }
   int64_t num_parameters() const { return num_parameters_; }
 
@@ -41,7 +67,7 @@ class WeightReader {
   void finish() const;
 
  private:
-  const SafeTensors& file_;
+  WeightSource& source_;
   at::ScalarType type_;
   int64_t num_parameters_ = 0;
   std::vector<std::string> taken_, ignored_, missing_, misshapen_;
