@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <ATen/ATen.h>
+#include <c10/core/GradMode.h>
 #include <torch/version.h>
 
 #include "patina/base/check.h"
@@ -90,7 +91,7 @@ at::Tensor attend(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v,
   PATINA_CHECK(q.scalar_type() == k.scalar_type() && q.scalar_type() == v.scalar_type());
   PATINA_CHECK(q.device() == k.device() && q.device() == v.device());
   PATINA_CHECK(q.stride(2) == 1 && k.stride(2) == 1 && v.stride(2) == 1);
-  if (at::GradMode::is_enabled() && (q.requires_grad() || k.requires_grad() || v.requires_grad())) {
+  if (c10::GradMode::is_enabled() && (q.requires_grad() || k.requires_grad() || v.requires_grad())) {
     PATINA_CHECK(!bias.buckets);
     return attend_recorded(q, k, v, num_heads);
   }

@@ -1,0 +1,201 @@
+#include "denoiser_training.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <ATen/ATen.h>
+#include <c10/core/InferenceMode.h>
+
+#include "denoiser_data.h"
+#include "parameters.h"
+#include "patina/base/files.h"
+#include "patina/diffusion/controlnet.h"
+#include "patina/diffusion/model.h"
+#include "patina/diffusion/schedulers.h"
+#include "patina/diffusion/text_encoder.h"
+#include "patina/diffusion/unet.h"
+
+namespace patina::train_mini {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace diffusion;
+
+constexpr double kSnrLimit = 5;           // γ of min-SNR weighting [Hang2023]
+constexpr double kControlDropout = 0.12;  // share of samples without the one or the other condition
+constexpr double kCheckpointSeconds = 240;
+
+constexpr std::array<const char*, 4> kComponents{"text_encoder", "unet", "controlnet_tile",
+                                                 "controlnet_normal"};
+
+struct Configs {
+  TextEncoderConfig text;
+  UNetConfig unet;
+  ControlNetConfig tile, normal;
+};
+
+struct Networks {
+  TextEncoder text;
+  UNet unet;
+  ControlNet tile, normal;
+};
+
+using Stores = std::vector<std::unique_ptr<Parameters>>;  // in the order of kComponents
+
+Networks networks_of(const Stores& stores, const Configs& configs, at::ScalarType type) {
+  const auto reader = [&](size_t i) { return nn::WeightReader(*stores[i], type); };
+  nn::WeightReader text = reader(0), unet = reader(1), tile = reader(2), normal = reader(3);
+  return {TextEncoder(configs.text, text), UNet(configs.unet, unet), ControlNet(configs.tile, tile),
+          ControlNet(configs.normal, normal)};
+}
+
+/// Residuals of a ControlNet, each sample's times its own scale [B].
+ControlResiduals scaled(ControlResiduals residuals, const at::Tensor& scale) {
+  for (at::Tensor& down : residuals.down) down = down * scale.view({-1, 1, 1, 1}).to(down.scalar_type());
+  residuals.mid = residuals.mid * scale.view({-1, 1, 1, 1}).to(residuals.mid.scalar_type());
+  return residuals;
+}
+
+/// Mean square error of the predicted velocity [Salimans2022], one a sample, [B].
+at::Tensor velocity_error(const Networks& networks, const DenoiserBatch& batch, const at::Tensor& timesteps,
+                          const at::Tensor& alphas_cumprod, const at::Tensor& tile_scale,
+                          const at::Tensor& normal_scale) {
+  const at::Tensor noise = at::randn_like(batch.latents);
+  const at::Tensor alpha_bar = alphas_cumprod.index_select(0, timesteps).view({-1, 1, 1, 1});
+  const at::Tensor signal = alpha_bar.sqrt(), spread = (1 - alpha_bar).sqrt();
+  const at::Tensor noisy = signal * batch.latents + spread * noise;
+  const at::Tensor velocity = signal * noise - spread * batch.latents;
+
+  const at::Tensor text = networks.text(batch.ids).last_hidden_state;
+  const at::Tensor times = timesteps.to(at::kFloat);
+  const ControlResiduals tile =
+      scaled(networks.tile(noisy, times, text, networks.tile.hint(batch.tile), 1.0f), tile_scale);
+  const ControlResiduals normal =
+      scaled(networks.normal(noisy, times, text, networks.normal.hint(batch.normal), 1.0f), normal_scale);
+  const ControlResiduals control = sum(tile, normal);
+  const at::Tensor predicted = networks.unet({noisy, times, text, &control}).to(at::kFloat);
+  return (predicted - velocity).square().mean({1, 2, 3});
+}
+
+DenoiserBatch on_device(DenoiserBatch batch, c10::Device device) {
+  for (at::Tensor* tensor : {&batch.latents, &batch.tile, &batch.normal, &batch.ids})
+    *tensor = tensor->to(device);
+  return batch;
+}
+
+/// Mean error over held-out views at fixed times, all conditions on.
+std::vector<double> held_out_errors(const Networks& networks, const DenoiserData& data,
+                                    const at::Tensor& alphas_cumprod, const std::vector<int64_t>& times,
+                                    c10::Device device) {
+  std::vector<double> errors;
+  for (const int64_t time : times) {
+    std::mt19937_64 random(7);
+    at::manual_seed(7);
+    const DenoiserBatch batch = on_device(data.draw(Cut::kView, 16, random, /*vary=*/false), device);
+    const at::Tensor ones = at::ones({16}, at::device(device));
+    const at::Tensor timesteps = at::full({16}, time, at::device(device).dtype(at::kLong));
+    errors.push_back(
+        velocity_error(networks, batch, timesteps, alphas_cumprod, ones, ones).mean().item<double>());
+  }
+  return errors;
+}
+
+}  // namespace
+
+void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserTraining& options) {
+  const DenoiserData training(work / "training", model), held_out(work / "held_out", model);
+  const Configs configs{read_text_encoder_config(model / "text_encoder"), read_unet_config(model / "unet"),
+                        read_controlnet_config(model / "controlnet_tile"),
+                        read_controlnet_config(model / "controlnet_normal")};
+  Stores stores;
+  for (const char* component : kComponents) {
+    stores.push_back(
+        std::make_unique<Parameters>(component, options.run.seed + 1000000 * stores.size(), options.device));
+    stores.back()->read(work / (std::string(component) + ".checkpoint"));
+  }
+  networks_of(stores, configs, at::kFloat);
+  for (const auto& store : stores)
+    std::printf("%s: %.2f M parameters\n", store->where().c_str(),
+                static_cast<double>(store->num_parameters()) * 1e-6);
+
+  const SchedulePlan plan = make_schedule(read_scheduler_config(model / "scheduler"), 10);
+  const at::Tensor alphas_cumprod = at::tensor(plan.alphas_cumprod, at::kFloat).to(options.device);
+  const fs::path step_file = work / "denoiser.step";
+  Run run(options.run, work / "denoiser.log",
+          fs::exists(step_file) ? std::stoll(read_text_file(step_file)) : 0);
+
+  const auto save = [&] {
+    for (size_t i = 0; i < stores.size(); ++i) {
+      stores[i]->write(work / (std::string(kComponents[i]) + ".checkpoint"));
+      const bool text = i == 0;
+      stores[i]->write_result(model / kComponents[i] /
+                              (text ? "model.safetensors" : "diffusion_pytorch_model.safetensors"));
+      stores[i]->use_average(true);
+    }
+    write_file(step_file, std::to_string(run.step()));
+    const c10::InferenceMode inference;
+    const std::vector<int64_t> times{50, 200, 400, 600, 800, 950};
+    const std::vector<double> errors = held_out_errors(networks_of(stores, configs, at::kFloat), held_out,
+                                                       alphas_cumprod, times, options.device);
+    const std::vector<double> seen = held_out_errors(networks_of(stores, configs, at::kFloat), training,
+                                                     alphas_cumprod, times, options.device);
+    for (const auto& store : stores) store->use_average(false);
+    std::printf("held out (training):");
+    for (size_t i = 0; i < times.size(); ++i)
+      std::printf(" t=%lld %.4f (%.4f)", static_cast<long long>(times[i]), errors[i], seen[i]);
+    std::printf("\n");
+    std::fflush(stdout);
+  };
+
+  for (; !run.finished(); run.next()) {
+    std::mt19937_64 random(options.run.seed + static_cast<uint64_t>(run.step()) * 0x9E3779B97F4A7C15u);
+    at::manual_seed(random());
+    const double lot = std::uniform_real_distribution<double>(0, 1)(random);
+    const Cut cut = lot < options.share_of_crops                            ? Cut::kCrop
+                    : lot < options.share_of_crops + options.share_of_grids ? Cut::kGrid
+                                                                            : Cut::kView;
+    const int64_t count = cut == Cut::kCrop   ? options.crops
+                          : cut == Cut::kView ? options.views
+                                              : options.grids;
+    const DenoiserBatch batch = on_device(training.draw(cut, count, random, /*vary=*/true), options.device);
+    const auto device = at::device(options.device);
+    const at::Tensor timesteps =
+        at::randint(0, plan.config.num_train_timesteps, {count}, device.dtype(at::kLong));
+    const at::Tensor tile_scale = (at::rand({count}, device) >= kControlDropout).to(at::kFloat);
+    const at::Tensor normal_scale = (at::rand({count}, device) >= kControlDropout).to(at::kFloat);
+
+    const Networks networks = networks_of(stores, configs, at::kBFloat16);
+    const at::Tensor errors =
+        velocity_error(networks, batch, timesteps, alphas_cumprod, tile_scale, normal_scale);
+    const at::Tensor alpha_bar = alphas_cumprod.index_select(0, timesteps);
+    const at::Tensor snr = alpha_bar / (1 - alpha_bar);
+    const at::Tensor loss =
+        (errors * at::clamp_max(snr, kSnrLimit) / (snr + 1)).mean() + 0.25 * (errors / (snr + 1)).mean();
+    loss.backward();
+
+    double squares = 0;
+    for (const auto& store : stores) squares += std::pow(store->gradient_norm(), 2);
+    const double norm = std::sqrt(squares);
+    Parameters::Adam adam;
+    adam.rate = run.rate();
+    adam.average = 0.9995;
+    if (std::isfinite(norm)) {
+      for (const auto& store : stores) {
+        if (norm > 1) store->scale_gradients(1 / norm);
+        store->step(adam, run.step());
+      }
+    }
+    const char* kind = cut == Cut::kCrop ? "crop" : cut == Cut::kView ? "view" : "grid";
+    run.log(
+        {{kind, errors.detach().mean().item<double>()}, {"loss", loss.item<double>()}, {"gradient", norm}});
+    if (run.due(kCheckpointSeconds)) save();
+  }
+  save();
+}
+
+}  // namespace patina::train_mini

@@ -1,0 +1,187 @@
+#include "parameters.h"
+
+#include <cmath>
+
+#include <ATen/ATen.h>
+#include <ATen/CPUGeneratorImpl.h>
+#include <c10/core/GradMode.h>
+#include <torch/version.h>
+
+#include "patina/base/error.h"
+
+namespace patina::train_mini {
+namespace {
+
+/// Of layers that a network starts without: residual branches add nothing at first.
+constexpr double kResidualScale = 0.1;
+/// Steps between two updates of the moving average.
+constexpr int64_t kAverageInterval = 4;
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+/// Values before training, by the name of the layer.
+at::Tensor initial(const std::string& name, at::IntArrayRef shape, uint64_t seed) {
+  if (ends_with(name, ".bias")) return at::zeros(shape);
+  if (shape.size() == 1) return at::ones(shape);  // gains of the norms
+  const at::Tensor normal = at::randn(shape, at::make_generator<at::CPUGeneratorImpl>(seed));
+  if (ends_with(name, "embedding.weight")) return normal * 0.02;
+  int64_t fan_in = 1;
+  for (size_t axis = 1; axis < shape.size(); ++axis) fan_in *= shape[axis];
+  double scale = 1 / std::sqrt(static_cast<double>(fan_in));
+  for (const char* last : {".conv2.weight", ".proj_out.weight", ".to_out.0.weight", ".net.2.weight",
+                           ".out_proj.weight", ".fc2.weight", "conv_out.weight"}) {
+    if (ends_with(name, last)) scale *= kResidualScale;
+  }
+  if (name.find("controlnet_down_blocks") == 0 || name.find("controlnet_mid_block") == 0)
+    scale *= kResidualScale;
+  if (name == "controlnet_cond_embedding.conv_out.weight") scale /= kResidualScale;
+  return normal * scale;
+}
+
+nn::TensorEntry entry_of(const std::string& name, const at::Tensor& tensor) {
+  return {name,
+          tensor.scalar_type() == at::kHalf ? nn::ElementType::kF16 : nn::ElementType::kF32,
+          tensor.sizes().vec(),
+          {static_cast<const uint8_t*>(tensor.data_ptr()), static_cast<size_t>(tensor.nbytes())}};
+}
+
+void write_tensors(const std::filesystem::path& file,
+                   const std::vector<std::pair<std::string, at::Tensor>>& tensors) {
+  std::vector<nn::TensorEntry> entries;
+  for (const auto& [name, tensor] : tensors) entries.push_back(entry_of(name, tensor));
+  nn::write_safetensors(file, entries);
+}
+
+using Tensors = std::vector<at::Tensor>;
+
+/// AdamW [Loshchilov2019]; `count` steps with this one.
+void adamw_step(Tensors& values, const Tensors& gradients, Tensors& firsts, Tensors& seconds,
+                const Parameters::Adam& adam, double count) {
+#if TORCH_VERSION_MAJOR >= 2
+  const Tensors counts(values.size(), at::full({}, count, values[0].options()));
+  at::_fused_adamw_(values, gradients, firsts, seconds, {}, counts, adam.rate, adam.beta1, adam.beta2,
+                    adam.weight_decay, adam.epsilon, /*amsgrad=*/false, /*maximize=*/false);
+#else
+  at::_foreach_mul_(values, 1 - adam.rate * adam.weight_decay);
+  at::_foreach_mul_(firsts, adam.beta1);
+  at::_foreach_add_(firsts, gradients, 1 - adam.beta1);
+  at::_foreach_mul_(seconds, adam.beta2);
+  at::_foreach_addcmul_(seconds, gradients, gradients, 1 - adam.beta2);
+  Tensors scales = at::_foreach_sqrt(seconds);
+  at::_foreach_div_(scales, std::sqrt(1 - std::pow(adam.beta2, count)));
+  at::_foreach_add_(scales, adam.epsilon);
+  at::_foreach_addcdiv_(values, firsts, scales, -adam.rate / (1 - std::pow(adam.beta1, count)));
+#endif
+}
+
+at::Tensor host_copy(const at::Tensor& tensor, at::ScalarType type = at::kFloat) {
+  return tensor.detach().to(at::kCPU, type).contiguous();
+}
+
+}  // namespace
+
+Parameters::Entry& Parameters::add(const std::string& name, const at::Tensor& value) {
+  const c10::NoGradGuard no_gradients;
+  const at::Tensor placed = value.to(device_, at::kFloat).contiguous();
+  index_[name] = entries_.size();
+  entries_.push_back({name, placed.clone().set_requires_grad(true), at::zeros_like(placed),
+                      at::zeros_like(placed), placed.clone()});
+  return entries_.back();
+}
+
+at::Tensor Parameters::find(const std::string& name, at::IntArrayRef expected, at::ScalarType type) {
+  const auto found = index_.find(name);
+  const Entry& entry = found != index_.end() ? entries_[found->second]
+                                             : add(name, initial(name, expected, seed_ + entries_.size()));
+  return (use_average_ ? entry.average : entry.value).to(type);
+}
+
+std::vector<std::string> Parameters::names() const {
+  std::vector<std::string> names;
+  for (const Entry& entry : entries_) names.push_back(entry.name);
+  return names;
+}
+
+void Parameters::step(const Adam& adam, int64_t step) {
+  const c10::NoGradGuard no_gradients;
+  std::vector<at::Tensor> values, gradients, firsts, seconds, averages;
+  for (Entry& entry : entries_) {
+    if (!entry.value.grad().defined()) continue;
+    values.push_back(entry.value), gradients.push_back(entry.value.grad());
+    firsts.push_back(entry.first_moment), seconds.push_back(entry.second_moment);
+    averages.push_back(entry.average);
+  }
+  if (values.empty()) return;
+  adamw_step(values, gradients, firsts, seconds, adam, static_cast<double>(step + 1));
+  if (step % kAverageInterval == 0) {
+    // Early averages forget faster, so that the first steps leave no trace.
+    const double kept = std::min(std::pow(adam.average, kAverageInterval),
+                                 (1 + static_cast<double>(step)) / (10 + static_cast<double>(step)));
+    at::_foreach_mul_(averages, kept);
+    at::_foreach_add_(averages, values, 1 - kept);
+  }
+  for (Entry& entry : entries_) entry.value.mutable_grad() = at::Tensor();
+}
+
+double Parameters::gradient_norm() const {
+  const c10::NoGradGuard no_gradients;
+  std::vector<at::Tensor> norms;
+  for (const Entry& entry : entries_) {
+    if (entry.value.grad().defined()) norms.push_back(entry.value.grad().norm());
+  }
+  return norms.empty() ? 0.0 : at::stack(norms).norm().item<double>();
+}
+
+void Parameters::scale_gradients(double factor) {
+  const c10::NoGradGuard no_gradients;
+  for (Entry& entry : entries_) {
+    if (entry.value.grad().defined()) entry.value.mutable_grad().mul_(factor);
+  }
+}
+
+void Parameters::write(const std::filesystem::path& file) const {
+  std::vector<std::pair<std::string, at::Tensor>> tensors;
+  for (const Entry& entry : entries_) {
+    tensors.emplace_back(entry.name, host_copy(entry.value));
+    tensors.emplace_back(entry.name + "|first", host_copy(entry.first_moment));
+    tensors.emplace_back(entry.name + "|second", host_copy(entry.second_moment));
+    tensors.emplace_back(entry.name + "|average", host_copy(entry.average));
+  }
+  write_tensors(file, tensors);
+}
+
+void Parameters::read(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return;
+  const nn::SafeTensors stored(file);
+  const auto tensor = [&](const std::string& name) {
+    const nn::TensorEntry* entry = stored.find(name);
+    if (!entry)
+      throw Error(ErrorCode::kFormat, file.string(),
+                  "lacks " + name + "; it is no checkpoint of the trainer");
+    return nn::read_tensor(stored, *entry, at::kFloat).to(device_).clone();
+  };
+  for (const nn::TensorEntry& stored_entry : stored.tensors()) {
+    const std::string& name = stored_entry.name;
+    if (name.find('|') != std::string::npos) continue;
+    Entry& entry = add(name, tensor(name));
+    entry.first_moment = tensor(name + "|first");
+    entry.second_moment = tensor(name + "|second");
+    entry.average = tensor(name + "|average");
+  }
+}
+
+void Parameters::write_result(const std::filesystem::path& file) const {
+  std::vector<std::pair<std::string, at::Tensor>> tensors;
+  for (const Entry& entry : entries_) tensors.emplace_back(entry.name, host_copy(entry.average, at::kHalf));
+  write_tensors(file, tensors);
+}
+
+int64_t Parameters::num_parameters() const {
+  int64_t count = 0;
+  for (const Entry& entry : entries_) count += entry.value.numel();
+  return count;
+}
+
+}  // namespace patina::train_mini

@@ -1,0 +1,167 @@
+#include "vae_training.h"
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <random>
+
+#include <ATen/ATen.h>
+#include <c10/core/InferenceMode.h>
+#include <nlohmann/json.hpp>
+
+#include "parameters.h"
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/diffusion/vae.h"
+#include "samples.h"
+
+namespace patina::train_mini {
+namespace {
+
+namespace fs = std::filesystem;
+using diffusion::Vae;
+using diffusion::VaeConfig;
+
+constexpr double kKlWeight = 1e-4, kGradientWeight = 0.5;
+constexpr int64_t kTile = 0, kTarget = 2;  // pictures of a sample
+constexpr double kCheckpointSeconds = 180;
+constexpr int64_t kHeldOutPictures = 24;
+
+/// Sample `index`'s picture in [-1,1], [3,256,256].
+at::Tensor picture(const SampleFolder& samples, int64_t index, int64_t which) {
+  return samples.pictures(index)[which].to(at::kFloat) / 127.5 - 1;
+}
+
+at::Tensor random_crops(const SampleFolder& samples, const VaeTraining& options, std::mt19937_64& random) {
+  std::vector<at::Tensor> crops;
+  for (int64_t i = 0; i < options.batch; ++i) {
+    const auto below = [&](int64_t end) {
+      return static_cast<int64_t>(random() % static_cast<uint64_t>(end));
+    };
+    const int64_t index = below(samples.size()), which = below(4) == 0 ? kTile : kTarget;
+    const int64_t free = mini_data::kViewSide - options.side + 1, y = below(free), x = below(free);
+    at::Tensor crop =
+        picture(samples, index, which).slice(1, y, y + options.side).slice(2, x, x + options.side);
+    if (below(2)) crop = crop.flip({2});
+    crops.push_back(crop);
+  }
+  return at::stack(crops).to(options.device);
+}
+
+/// Mean |difference| of neighbouring pixels' steps: blur shows here, where the plain difference hardly sees
+/// it.
+at::Tensor gradient_error(const at::Tensor& difference) {
+  const at::Tensor dx = difference.slice(3, 1) - difference.slice(3, 0, -1),
+                   dy = difference.slice(2, 1) - difference.slice(2, 0, -1);
+  return dx.abs().mean() + dy.abs().mean();
+}
+
+double psnr(double mean_square) {
+  return -10 * std::log10(mean_square);
+}
+
+double held_out_psnr(const Vae& vae, const SampleFolder& samples, c10::Device device) {
+  double sum = 0;
+  const int64_t count = std::min(kHeldOutPictures, samples.size());
+  for (int64_t i = 0; i < count; ++i) {
+    const at::Tensor x = picture(samples, i * samples.size() / count, kTarget).unsqueeze(0).to(device);
+    const at::Tensor y = vae.decode(vae.encode(x).mean).clamp(-1, 1);
+    sum += psnr(((x - y) / 2).square().mean().item<double>());
+  }
+  return sum / static_cast<double>(count);
+}
+
+Vae vae_of(Parameters& parameters, const VaeConfig& config, at::ScalarType type) {
+  nn::WeightReader weights(parameters, type);
+  return Vae(config, weights);
+}
+
+}  // namespace
+
+void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& options) {
+  const SampleFolder training(work / "training"), held_out(work / "held_out");
+  const VaeConfig config = diffusion::read_vae_config(model / "vae");
+  Parameters parameters("vae", options.run.seed, options.device);
+  const fs::path checkpoint = work / "vae.checkpoint", step_file = work / "vae.step";
+  parameters.read(checkpoint);
+  Run run(options.run, work / "vae.log", fs::exists(step_file) ? std::stoll(read_text_file(step_file)) : 0);
+  vae_of(parameters, config, at::kFloat);
+  std::printf("VAE: %.2f M parameters, %lld training pictures\n",
+              static_cast<double>(parameters.num_parameters()) * 1e-6,
+              static_cast<long long>(training.size()));
+
+  const auto save = [&] {
+    parameters.write(checkpoint);
+    write_file(step_file, std::to_string(run.step()));
+    parameters.write_result(model / "vae" / "diffusion_pytorch_model.safetensors");
+    const c10::InferenceMode inference;
+    parameters.use_average(true);
+    const double quality = held_out_psnr(vae_of(parameters, config, at::kFloat), held_out, options.device);
+    parameters.use_average(false);
+    std::printf("held out: %.2f dB\n", quality);
+    std::fflush(stdout);
+    return quality;
+  };
+  for (; !run.finished(); run.next()) {
+    std::mt19937_64 random(options.run.seed + static_cast<uint64_t>(run.step()) * 0x9E3779B97F4A7C15u);
+    at::manual_seed(random());
+    const at::Tensor x = random_crops(training, options, random);
+    const Vae vae = vae_of(parameters, config, at::kBFloat16);
+    const diffusion::Posterior posterior = vae.encode(x);
+    at::Tensor latents = posterior.mean + at::exp(0.5 * posterior.logvar) * at::randn_like(posterior.mean);
+    if (options.decoder_only) latents = latents.detach();
+    const at::Tensor difference = vae.decode(latents) - x;
+    const at::Tensor kl =
+        0.5 * (posterior.mean.square() + at::exp(posterior.logvar) - 1 - posterior.logvar).mean();
+    const at::Tensor reconstruction = difference.abs().mean() + kGradientWeight * gradient_error(difference);
+    const at::Tensor loss = options.decoder_only ? reconstruction : reconstruction + kKlWeight * kl;
+    loss.backward();
+    const double norm = parameters.gradient_norm();
+    if (norm > 1) parameters.scale_gradients(1 / norm);
+    Parameters::Adam adam;
+    adam.rate = run.rate();
+    adam.weight_decay = 0;
+    if (std::isfinite(norm)) parameters.step(adam, run.step());
+    run.log({{"loss", reconstruction.item<double>()},
+             {"kl", kl.item<double>()},
+             {"psnr", psnr((difference.detach() / 2).square().mean().item<double>())},
+             {"gradient", norm}});
+    if (run.due(kCheckpointSeconds)) save();
+  }
+  save();
+}
+
+void encode_latents(const fs::path& work, const fs::path& model, c10::Device device) {
+  const c10::InferenceMode inference;
+  const Vae vae(model / "vae", at::kBFloat16);
+  double sum_of_squares = 0, count = 0;
+  for (const char* part : {"training", "held_out"}) {
+    const SampleFolder samples(work / part);
+    write_file_with(work / part / "latents.f16", [&](const fs::path& temporary) {
+      std::ofstream out(temporary, std::ios::binary);
+      for (int64_t i = 0; i < samples.size(); ++i) {
+        const at::Tensor aged = picture(samples, i, kTarget);
+        const at::Tensor pictures = at::stack({aged, aged.flip({2})}).to(device);
+        const at::Tensor latents = vae.encode(pictures).mean;
+        sum_of_squares += latents.square().sum().item<double>();
+        count += static_cast<double>(latents.numel());
+        const at::Tensor halves = latents.to(at::kCPU, at::kHalf).contiguous();
+        out.write(static_cast<const char*>(halves.data_ptr()), static_cast<std::streamsize>(halves.nbytes()));
+        if (i % 200 == 0) {
+          std::printf("latents %s %lld / %lld\n", part, static_cast<long long>(i),
+                      static_cast<long long>(samples.size()));
+          std::fflush(stdout);
+        }
+      }
+      if (!out.flush())
+        throw Error(ErrorCode::kIo, temporary.string(), "could not be written; is the disk full?");
+    });
+  }
+  const fs::path config_file = model / "vae" / "config.json";
+  auto config = nlohmann::ordered_json::parse(read_text_file(config_file));
+  config["scaling_factor"] = 1 / std::sqrt(sum_of_squares / count);
+  write_file(config_file, config.dump(2) + "\n");
+  std::printf("scaling factor %.5f\n", 1 / std::sqrt(sum_of_squares / count));
+}
+
+}  // namespace patina::train_mini
