@@ -20,8 +20,9 @@ struct AblationOptions {
   /// The steps are made with the first; time and memory of the last step are measured with all. Empty: with
   /// what the configuration says.
   std::vector<int> view_counts;
-  bool fit = true;     // carry every step into textures and measure those too
-  PointOptions point;  // that the crops show
+  bool noise_paper = true;  // the step with the paper's own noise between "+ tile" and the exact noise
+  bool fit = true;          // carry every step into textures and measure those too
+  PointOptions point;       // that the crops show
 };
 
 /// One configuration of the comparison. `name` is its folder: "noise-exact", "bias-1.2", "bias-1.2-additive".

@@ -36,7 +36,7 @@ std::vector<AblationStep> ablation_steps(const Config& config, const AblationOpt
   current.detail.tile_scale = config.detail.tile_scale;
   add("tile", "+ ControlNet tile", fmt::format("scale {}", current.detail.tile_scale));
   current.noise = correspond::NoiseMode::kPaper;
-  add("noise-paper", "+ noise (paper)", "on the surface, 4 × 4 point samples");
+  if (options.noise_paper) add("noise-paper", "+ noise (paper)", "on the surface, 4 × 4 point samples");
   current.noise = correspond::NoiseMode::kExact;
   add("noise-exact", "+ noise (exact)", "on the surface, whole footprints");
   for (const BiasScaling scaling : options.scalings)

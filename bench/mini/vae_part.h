@@ -1,0 +1,28 @@
+// What the model's autoencoder loses: held-out renders encoded and decoded again.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "patina/diffusion/detail.h"
+#include "patina/image/image.h"
+
+namespace patina::bench {
+
+/// The mean of the encoder's posterior, decoded; [H,W,3] sRGB in [0,1], as the pipeline uses the autoencoder.
+Image vae_round_trip(const diffusion::Model& model, const Image& srgb);
+
+struct MaskedPicture {
+  Image srgb;      // [H,W,3]
+  Image coverage;  // [H,W,1], the object
+};
+
+/// Mean over pictures of the PSNR, of whole pictures and of the object's pixels; leaves a sheet (a picture,
+/// what came back, their difference × 4) at `sheet`.
+nlohmann::json measure_vae(const diffusion::Model& model, std::span<const MaskedPicture> pictures,
+                           const std::filesystem::path& sheet);
+
+}  // namespace patina::bench
