@@ -56,7 +56,11 @@ Composer::Composer(const std::filesystem::path& shards, Part objects, Part mater
     return !material.is_mask && material.held_out != (materials == Part::kHeldOut);
   });
   state_->catalog = mini_data::catalog_of(state_->dataset);
-  state_->library = mini_data::make_library(state_->dataset, at::kCPU);
+  state_->library = mini_data::make_library(data, at::kCPU);
+  // The library has copied all planes; plans need but names and numbers.
+  for (mini_data::ObjectData& object : data.objects)
+    for (mini_data::ViewData& view : object.views) view.planes = {}, view.depth = {};
+  for (mini_data::MaterialData& material : data.materials) material.planes = {};
 }
 Composer::~Composer() = default;
 

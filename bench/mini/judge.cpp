@@ -4,7 +4,6 @@
 #include <numeric>
 
 #include "asked.h"
-#include "known_windows.h"
 #include "patina/base/check.h"
 #include "texture_features.h"
 

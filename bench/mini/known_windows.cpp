@@ -11,7 +11,7 @@ namespace {
 
 using namespace mini_data;
 
-constexpr size_t kPlansATime = 4;  // bounds memory: a composed view takes some 60 MB on the way
+constexpr size_t kPlansATime = 2;  // bounds memory: a composed view takes some 60 MB on the way
 
 std::vector<Composed> compose_all(const Composer& composer, const std::vector<Plan>& plans) {
   std::vector<Composed> out;

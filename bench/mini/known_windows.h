@@ -12,9 +12,6 @@
 
 namespace patina::bench {
 
-inline constexpr int kWindowSide = 48;  // pixels; a view has 256, an object about 200 of them
-inline constexpr float kLeastValid = 0.7f;
-
 struct KnownWindow {
   std::vector<float> features;
   int label = 0;       // into asked_classes(); their number: untouched_class()

@@ -29,6 +29,9 @@ TexturePlanes texture_planes(const Image& srgb, const Image& coverage);
 struct Window {
   int left = 0, top = 0, side = 0;
 };
+inline constexpr int kWindowSide = 48;  // pixels; a view has 256, an object about 200 of them
+inline constexpr float kLeastValid = 0.7f;
+
 /// Squares every half side with at least `least_valid` of their pixels valid.
 std::vector<Window> windows_on_object(const TexturePlanes& planes, int side, float least_valid);
 
