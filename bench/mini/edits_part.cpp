@@ -65,7 +65,7 @@ std::vector<ViewMarks> marks_of(const AssetEditor& editor) {
 
 // What edits keep, over all runs.
 struct Structure {
-  EdgeMatch inside, with_silhouette, by_chance;
+  EdgeMatch inside, with_silhouette, by_chance;  // by_chance: of views of which there are at least two
   Mean bleed, change;
 
   void add(const AssetEditor& editor, const std::vector<ViewMarks>& marks, std::span<const Image> edited) {
@@ -76,7 +76,7 @@ struct Structure {
       with_silhouette.add(match_edges(edges, marks[v].edges, marks[v].all, width));
       // The same asset from elsewhere has as many edges of the same kind, in other places.
       const ViewMarks& other = marks[(v + 1) % marks.size()];
-      by_chance.add(match_edges(edges, other.edges, marks[v].inside, width));
+      if (marks.size() > 1) by_chance.add(match_edges(edges, other.edges, marks[v].inside, width));
       bleed.add(mean_change(edited[v], editor.views().tile[v], marks[v].ground_near));
       change.add(mean_change(edited[v], editor.views().tile[v], marks[v].inside));
     }
@@ -93,85 +93,107 @@ struct Structure {
   }
 };
 
+// Whether what was asked for is seen, over all runs.
+struct Obedience {
+  struct OfClass {
+    int runs = 0, first = 0, first_three = 0;
+    std::map<std::string, int> seen_as;  // what was first where the asked class was not among three
+  };
+  std::vector<OfClass> classes = std::vector<OfClass>(asked_classes().size());
+  json each = json::array();
+
+  void add(const Ranking& ranking, size_t asked, const std::string& asset, const std::string& prompt) {
+    json first_three = json::array();
+    for (size_t i = 0; i < 3; ++i)
+      first_three.push_back(asked_classes()[static_cast<size_t>(ranking.classes[i])].name);
+    const int place = ranking.place_of(static_cast<int>(asked));
+    OfClass& of_class = classes[asked];
+    ++of_class.runs, of_class.first += place < 1, of_class.first_three += place < 3;
+    if (place >= 3) ++of_class.seen_as[first_three[0].get<std::string>()];
+    each.push_back({{"asset", asset},
+                    {"class", asked_classes()[asked].name},
+                    {"prompt", prompt},
+                    {"place", place + 1},
+                    {"first_three", first_three}});
+  }
+
+  json to_json() const {
+    json table = json::object();
+    double runs = 0, first = 0, first_three = 0;
+    for (size_t c = 0; c < classes.size(); ++c) {
+      const OfClass& of_class = classes[c];
+      table[asked_classes()[c].name] = {{"runs", of_class.runs},
+                                        {"top1", of_class.first},
+                                        {"top3", of_class.first_three},
+                                        {"seen_as", of_class.seen_as}};
+      runs += of_class.runs, first += of_class.first, first_three += of_class.first_three;
+    }
+    return {{"top3", first_three / runs},    {"top1", first / runs}, {"runs", each.size()},
+            {"num_classes", classes.size()}, {"classes", table},     {"each", each}};
+  }
+};
+
+// What a prompt that asks for no change leaves as it was.
+struct Clean {
+  Mean object, with_ground;  // dB; the first over assets
+  json assets = json::object();
+
+  void add(const AssetEditor& editor, const HeldOutAsset& asset, std::span<const Image> edited) {
+    Mean psnr;
+    for (size_t v = 0; v < edited.size(); ++v) {
+      psnr.add(report::psnr(edited[v], editor.views().tile[v], editor.coverage()[v]));
+      with_ground.add(report::psnr(edited[v], editor.views().tile[v]));
+    }
+    object.add(psnr.value());
+    assets[asset.name] = {{"prompt", asset.clean_prompt}, {"psnr", json_number(psnr.value())}};
+  }
+
+  json to_json() const {
+    return {{"psnr", json_number(object.value())},
+            {"psnr_with_ground", json_number(with_ground.value())},
+            {"assets", assets}};
+  }
+};
+
+Ranking judged(const AssetEditor& editor, std::span<const Image> edited, const Discriminant& classifier) {
+  std::vector<JudgedView> views;
+  for (size_t v = 0; v < edited.size(); ++v)
+    views.push_back({&editor.views().tile[v], &edited[v], &editor.coverage()[v]});
+  return judge_edit(classifier, views);
+}
+
 }  // namespace
 
 json measure_edits(std::span<const HeldOutAsset> assets, const EditSettings& settings,
                    const Discriminant& classifier, const fs::path& folder,
                    std::optional<diffusion::Model>& model) {
-  const auto& classes = asked_classes();
+  Obedience obedience;
+  Clean clean;
   Structure structure;
-  Mean clean_psnr, clean_psnr_whole;
-  json runs = json::array(), clean = json::object();
-  std::vector<int> hits1(classes.size(), 0), hits3(classes.size(), 0);
-  std::map<std::string, std::map<std::string, int>> seen_as;
-  std::vector<Image> pictures;
-
+  std::vector<Image> pictures;  // of each asset: as rendered, with the clean prompt, with every class's
   for (size_t a = 0; a < assets.size(); ++a) {
-    const AssetEditor editor(assets[a], settings, folder, model);
+    const HeldOutAsset& asset = assets[a];
+    const AssetEditor editor(asset, settings, folder, model);
     const std::vector<ViewMarks> marks = marks_of(editor);
-    const std::vector<Image>& before = editor.views().tile;
-    pictures.push_back(before[0]);
-
-    const std::vector<Image> as_it_is = editor.edited("clean", assets[a].clean_prompt);
-    pictures.push_back(as_it_is[0]);
-    Mean psnr;
-    for (size_t v = 0; v < before.size(); ++v) {
-      psnr.add(report::psnr(as_it_is[v], before[v], editor.coverage()[v]));
-      clean_psnr_whole.add(report::psnr(as_it_is[v], before[v]));
-    }
-    clean_psnr.add(psnr.value());
-    clean[assets[a].name] = {{"prompt", assets[a].clean_prompt}, {"psnr", json_number(psnr.value())}};
-
-    for (size_t c = 0; c < classes.size(); ++c) {
-      const std::string prompt = prompt_of(classes[c], assets[a].words, a);
-      std::printf("\r%-8s %2zu of %zu  %-60.60s", assets[a].name.c_str(), c + 1, classes.size(),
+    const std::vector<Image> as_it_is = editor.edited("clean", asset.clean_prompt);
+    clean.add(editor, asset, as_it_is);
+    pictures.insert(pictures.end(), {editor.views().tile[0], as_it_is[0]});
+    for (size_t c = 0; c < asked_classes().size(); ++c) {
+      const AskedClass& asked = asked_classes()[c];
+      const std::string prompt = prompt_of(asked, asset.words, a);
+      std::printf("\r%-8s %2zu of %zu  %-60.60s", asset.name.c_str(), c + 1, asked_classes().size(),
                   prompt.c_str());
       std::fflush(stdout);
-      const std::vector<Image> edited = editor.edited(classes[c].name, prompt);
-      std::vector<JudgedView> judged;
-      for (size_t v = 0; v < edited.size(); ++v)
-        judged.push_back({&before[v], &edited[v], &editor.coverage()[v]});
-      const Ranking ranking = judge_edit(classifier, judged);
-      const int place = ranking.place_of(static_cast<int>(c));
-      hits1[c] += place < 1, hits3[c] += place < 3;
-      json first_three = json::array();
-      for (size_t i = 0; i < 3; ++i)
-        first_three.push_back(classes[static_cast<size_t>(ranking.classes[i])].name);
-      if (place >= 3) ++seen_as[classes[c].name][first_three[0].get<std::string>()];
-      runs.push_back({{"asset", assets[a].name},
-                      {"class", classes[c].name},
-                      {"prompt", prompt},
-                      {"place", place + 1},
-                      {"first_three", first_three}});
+      const std::vector<Image> edited = editor.edited(asked.name, prompt);
+      obedience.add(judged(editor, edited, classifier), c, asset.name, prompt);
       structure.add(editor, marks, edited);
       pictures.push_back(edited[0]);
     }
   }
   std::printf("\n");
-  write_image(folder / "obedience.png", report::contact_sheet(pictures, 11, 160));
-
-  json table = json::object();
-  int all1 = 0, all3 = 0;
-  for (size_t c = 0; c < classes.size(); ++c) {
-    table[classes[c].name] = {{"runs", assets.size()},
-                              {"top1", hits1[c]},
-                              {"top3", hits3[c]},
-                              {"seen_as", seen_as[classes[c].name]}};
-    all1 += hits1[c], all3 += hits3[c];
-  }
-  const auto count = static_cast<double>(runs.size());
-  return {{"obedience",
-           {{"top3", all3 / count},
-            {"top1", all1 / count},
-            {"runs", runs.size()},
-            {"num_classes", classes.size()},
-            {"classes", table},
-            {"each", runs}}},
-          {"clean",
-           {{"psnr", json_number(clean_psnr.value())},
-            {"psnr_with_ground", json_number(clean_psnr_whole.value())},
-            {"assets", clean}}},
-          {"structure", structure.to_json()}};
+  constexpr int kColumns = 11;  // two rows an asset
+  write_image(folder / "obedience.png", report::contact_sheet(pictures, kColumns, 160));
+  return {{"obedience", obedience.to_json()}, {"clean", clean.to_json()}, {"structure", structure.to_json()}};
 }
 
 }  // namespace patina::bench
