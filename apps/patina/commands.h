@@ -14,5 +14,6 @@ void add_report(CLI::App& program);
 void add_ablate(CLI::App& program);
 void add_show_attention(CLI::App& program);
 void add_info(CLI::App& program);
+void add_models(CLI::App& program);
 
 }  // namespace patina::app

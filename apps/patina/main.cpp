@@ -54,6 +54,7 @@ int main(int argc, char** argv) {
   patina::app::add_ablate(program);
   patina::app::add_show_attention(program);
   patina::app::add_info(program);
+  patina::app::add_models(program);
 
   patina::app::install_stop_handler();
   try {

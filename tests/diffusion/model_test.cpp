@@ -102,7 +102,7 @@ TEST_F(ModelFolder, tensors_of_another_network_are_refused) {
     extra.name = "add_embedding.linear_1.weight";
     tensors.push_back(extra);
   });
-  expect_message("do not belong to the network that config.json describes: add_embedding.linear_1.weight");
+  expect_message("do not belong to a network of this configuration: add_embedding.linear_1.weight");
 }
 
 TEST_F(ModelFolder, a_truncated_file_is_refused) {

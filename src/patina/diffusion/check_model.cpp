@@ -1,39 +1,184 @@
-// Looks at a model folder without loading it, so that a wrong path is told before hours of rendering.
-#include <array>
-#include <utility>
+#include "patina/diffusion/check_model.h"
+
+#include <cstdio>
+#include <cstring>
 
 #include "patina/base/error.h"
-#include "patina/diffusion/component.h"
+#include "patina/diffusion/controlnet.h"
 #include "patina/diffusion/detail.h"
+#include "patina/diffusion/dry_run.h"
+#include "patina/diffusion/embedding.h"
+#include "patina/diffusion/model_folders.h"
+#include "patina/diffusion/model_parts.h"
+#include "patina/diffusion/text_encoder.h"
 #include "patina/diffusion/unet.h"
-#include "patina/nn/safetensors.h"
+#include "patina/diffusion/vae.h"
 
 namespace patina::diffusion {
+namespace {
 
 namespace fs = std::filesystem;
 
-void check_model(const ModelPaths& paths) {
-  nn::refuse_pickle_name(paths.model);
-  if (!fs::is_directory(paths.model))
-    throw Error(ErrorCode::kNotFound, paths.model.string(),
-                fs::exists(paths.model) ? "is a file; expected a model folder in the diffusers layout"
-                                        : "does not exist; expected a model folder in the diffusers layout");
-  const std::array<std::pair<const char*, fs::path>, 5> networks = {
-      {{"text_encoder", {}},
-       {"unet", {}},
-       {"vae", paths.vae},
-       {"controlnet_tile", paths.controlnet_tile},
-       {"controlnet_normal", paths.controlnet_normal}}};
-  for (const auto& [name, given] : networks) {
-    const fs::path folder = given.empty() ? paths.model / name : given;
-    nn::refuse_pickle_name(folder);
-    if (!fs::exists(folder))
-      throw Error(ErrorCode::kNotFound, folder.string(),
-                  given.empty() ? "is missing from the model; put it there or name another folder (--vae, "
-                                  "--controlnet-tile, --controlnet-normal)"
-                                : "does not exist");
-    if (fs::is_directory(folder)) nn::SafeTensors(weight_file(folder));  // reads and checks the header alone
+std::string formatted(const char* format, auto... values) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+/// Elements whose exponent is all ones: infinities and what is no number.
+template <class Bits>
+size_t count_not_finite(std::span<const uint8_t> bytes, Bits exponent) {
+  size_t count = 0;
+  for (size_t at = 0; at + sizeof(Bits) <= bytes.size(); at += sizeof(Bits)) {
+    Bits bits;
+    std::memcpy(&bits, bytes.data() + at, sizeof bits);
+    count += (bits & exponent) == exponent;
   }
+  return count;
+}
+
+size_t count_not_finite(const nn::TensorEntry& entry) {
+  switch (entry.type) {
+    case nn::ElementType::kF16:
+      return count_not_finite<uint16_t>(entry.bytes, 0x7C00);
+    case nn::ElementType::kBF16:
+      return count_not_finite<uint16_t>(entry.bytes, 0x7F80);
+    case nn::ElementType::kF32:
+      return count_not_finite<uint32_t>(entry.bytes, 0x7F800000);
+    case nn::ElementType::kF64:
+      return count_not_finite<uint64_t>(entry.bytes, 0x7FF0000000000000);
+    default:
+      return 0;
+  }
+}
+
+const char* name_of(Naming naming) {
+  switch (naming) {
+    case Naming::kLdm:
+      return "LDM's names";
+    case Naming::kOpenClip:
+      return "OpenCLIP's names";
+    default:
+      return "diffusers' names";
+  }
+}
+
+/// Checks a network and tells of it in one line.
+template <class Config>
+std::string checked(const NetworkPart<Config>& part) {
+  check_tensors(part);
+  int64_t parameters = 0;
+  for (const auto& [name, tensor] : part.table.tensors) parameters += tensor.entry.num_elements();
+  return formatted("  %-13s %zu tensors, %.1f M parameters, %s\n", name_of(part.table.network),
+                   part.table.tensors.size(), static_cast<double>(parameters) * 1e-6,
+                   name_of(part.table.naming));
+}
+
+std::string check_model_folder(const fs::path& folder) {
+  std::string text = checked(open_unet(folder / "unet"));
+  if (fs::is_directory(folder / "text_encoder")) text += checked(open_text_encoder(folder / "text_encoder"));
+  if (fs::is_directory(folder / "vae")) text += checked(open_vae(folder / "vae"));
+  for (const char* name : {"controlnet_tile", "controlnet_normal"}) {
+    if (fs::is_directory(folder / name)) text += checked(open_controlnet(folder / name));
+  }
+  for (const char* name : {"unet", "text_encoder", "vae", "controlnet_tile", "controlnet_normal"}) {
+    if (fs::is_directory(folder / name)) check_values(open_weight_files(folder / name));
+  }
+  return text;
+}
+
+std::string check_weights(const fs::path& path, FileKind kind) {
+  const WeightFiles files = open_weight_files(path);
+  std::string text;
+  switch (kind) {
+    case FileKind::kCheckpoint:
+    case FileKind::kUNet:
+      text = checked(open_unet(path));
+      if (find_network(files, Network::kTextEncoder)) text += checked(open_text_encoder(path));
+      if (find_network(files, Network::kVae)) text += checked(open_vae(path));
+      break;
+    case FileKind::kVae:
+      text = checked(open_vae(path));
+      break;
+    case FileKind::kTextEncoder:
+      text = checked(open_text_encoder(path));
+      break;
+    case FileKind::kControlNet:
+      text = checked(open_controlnet(path));
+      break;
+    case FileKind::kLora:
+      text = formatted("  %zu tensors; whether they fit a model is told when both are given\n",
+                       files.tensors.size());
+      break;
+    case FileKind::kEmbedding: {
+      const int64_t width = files.tensors.begin()->second.entry.shape.back();
+      for (const LearnedWord& word : read_embedding(path, width))
+        text += formatted("  word '%s', %lld vectors of %lld\n", printable(word.word, 80).c_str(),
+                          static_cast<long long>(word.count), static_cast<long long>(width));
+      break;
+    }
+    case FileKind::kOther:
+      break;
+  }
+  check_values(files);
+  return text;
+}
+
+}  // namespace
+
+void check_tensors(const UNetPart& part) {
+  check_tensors<UNet>(part);
+}
+void check_tensors(const VaePart& part) {
+  check_tensors<Vae>(part);
+}
+void check_tensors(const TextEncoderPart& part) {
+  check_tensors<TextEncoder>(part);
+}
+void check_tensors(const ControlNetPart& part) {
+  check_tensors<ControlNet>(part);
+}
+
+void check_values(const WeightFiles& files) {
+  std::string faults;
+  size_t num_faults = 0;
+  for (const auto& [name, tensor] : files.tensors) {
+    const size_t count = count_not_finite(tensor.entry);
+    if (count == 0) continue;
+    if (++num_faults <= 8)
+      faults += (faults.empty() ? "" : ", ") + printable(name, 100) + " (" + std::to_string(count) + " of " +
+                std::to_string(tensor.entry.num_elements()) + ")";
+  }
+  if (num_faults > 0)
+    throw Error(ErrorCode::kFormat, files.where.string(),
+                std::to_string(num_faults) + " tensors hold infinities or what is no number: " + faults);
+}
+
+std::string check_path(const fs::path& path) {
+  if (!fs::exists(path)) throw Error(ErrorCode::kNotFound, path.string(), "does not exist");
+  nn::refuse_pickle_name(path);
+  const ModelEntry entry = describe_entry(path);
+  if (!entry.refusal.empty()) throw Error(ErrorCode::kUnsupported, path.string(), entry.refusal);
+  std::string text =
+      path.string() + "\n  " + (entry.is_model_folder ? "diffusers model" : name_of(entry.kind));
+  if (entry.family) text += std::string(", ") + name_of(*entry.family);
+  text += ", " + entry.precision + formatted(", %.1f MB\n", static_cast<double>(entry.bytes) * 1e-6);
+  text += entry.is_model_folder ? check_model_folder(path) : check_weights(path, entry.kind);
+  for (const std::string& lack : entry.lacks) text += "  needs a " + lack + " beside it\n";
+  return text + "  All tensors are there, of the right shape, and finite.\n";
+}
+
+void check_model(const ModelPaths& paths) {
+  const ModelParts parts = find_model_parts(paths);
+  check_tensors(parts.unet);
+  check_tensors(parts.text_encoder);
+  check_tensors(parts.vae);
+  check_tensors(parts.controlnet_tile);
+  check_tensors(parts.controlnet_normal);
+}
+
+std::vector<fs::path> model_files(const ModelPaths& paths) {
+  return find_model_parts(paths).files;
 }
 
 }  // namespace patina::diffusion

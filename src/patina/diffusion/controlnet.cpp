@@ -50,7 +50,7 @@ ControlNet::ControlNet(const ControlNetConfig& config, nn::WeightReader& weights
 }
 
 ControlNet::ControlNet(const std::filesystem::path& folder, at::ScalarType type)
-    : ControlNet(load_network<ControlNet>(read_controlnet_config(folder), folder, type)) {}
+    : ControlNet(load_network<ControlNet>(open_controlnet(folder), type)) {}
 
 at::Tensor ControlNet::hint(const at::Tensor& condition, const nn::Recorder& record) const {
   PATINA_CHECK_EQ(condition.dim(), 4);

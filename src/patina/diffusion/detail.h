@@ -22,12 +22,27 @@ enum class Scheduler { kDdim, kPndm, kEuler, kEulerAncestral, kDpmSolverPp2m, kD
 enum class Dtype { kAuto, kF32, kBf16 };
 enum class BiasScaling { kPaper, kAdditive };  // β = w/√d or β = w
 
-/// Where the components of a model lie; an empty path takes the component from `model`.
+enum class PredictionChoice { kAuto, kEpsilon, kV };  // what the U-Net was trained to tell
+
+/// A low-rank change of the weights [Hu2022] and how much of it.
+struct LoraChoice {
+  std::filesystem::path file;
+  float weight = 1;
+  bool operator==(const LoraChoice&) const = default;
+};
+
+/// Where the components of a model lie; an empty path takes the component from `model`, else from the model
+/// folders. Each may be a folder, a file, or the name of a file in the model folders (model_parts.h).
 struct ModelPaths {
-  std::filesystem::path model;  // a diffusers folder
+  std::filesystem::path model;  // a diffusers folder or a single-file checkpoint
   std::filesystem::path vae;
   std::filesystem::path controlnet_tile;    // default: <model>/controlnet_tile
   std::filesystem::path controlnet_normal;  // default: <model>/controlnet_normal
+  std::filesystem::path text_encoder = {}, tokenizer = {};
+  std::vector<LoraChoice> loras = {};
+  std::vector<std::filesystem::path> embeddings = {};  // textual inversion
+  std::vector<std::filesystem::path> model_dirs = {};  // folders of other tools, where models are looked for
+  PredictionChoice prediction = PredictionChoice::kAuto;
 };
 
 struct ModelOptions {
@@ -38,6 +53,9 @@ struct ModelOptions {
 /// Looks at the folders and weight files of a model without loading it. Throws Error that names what is
 /// missing, broken or a pickle.
 void check_model(const ModelPaths& paths);
+
+/// Every file that a model is read from; what tells whether it changed.
+std::vector<std::filesystem::path> model_files(const ModelPaths& paths);
 
 /// A loaded model: weights are memory-mapped. Opaque; move-only.
 class Model {
@@ -73,7 +91,8 @@ struct DetailInputs {
 };
 
 struct DetailOptions {
-  std::string prompt = {}, negative_prompt = {};
+  std::string prompt = {}, negative_prompt = {};  // with weights as prompt.h reads them
+  int clip_skip = 1;  // 1: the whole text encoder; n leaves out its last n - 1 layers
   int num_steps = 20;
   float guidance_scale = 7.5f;  // 1: no guidance, one evaluation a step
   float strength = 0.8f;        // (0,1]: share of the steps that is run [Meng2022]

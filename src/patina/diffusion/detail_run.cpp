@@ -158,10 +158,10 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
 
   // What stays the same over all steps.
   run->bias = {inputs.bias_levels, options.bias_weight, options.bias_scaling == BiasScaling::kPaper};
-  at::Tensor text = encode_text(networks.tokenizer, networks.text_encoder, options.prompt);
-  if (options.guidance_scale != 1) {
-    text = at::cat({encode_text(networks.tokenizer, networks.text_encoder, options.negative_prompt), text});
-  }
+  std::vector<std::string> prompts{options.prompt};
+  if (options.guidance_scale != 1) prompts.insert(prompts.begin(), options.negative_prompt);
+  const at::Tensor text =
+      encode_prompts(networks.tokenizer, networks.text_encoder, networks.words, prompts, options.clip_skip);
   run->denoiser = {
       &networks.unet,
       {{&networks.controlnet_tile, grid_hint(networks.controlnet_tile, inputs.tile_views, sizes.grid),

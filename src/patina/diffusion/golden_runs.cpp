@@ -65,7 +65,7 @@ void check_run(const Stored& stored, Parts& parts, const SchedulePlan& plan, int
   comparison.add("timesteps", tensor_of(plan.timesteps, static_cast<size_t>(start)), stored["timesteps"],
                  kModuleLimit);
   const auto encode = [&](const std::string& which, const std::string& text) {
-    const at::Tensor embedding = encode_text(parts.tokenizer(), parts.text_encoder(), text);
+    const at::Tensor embedding = encode_prompts(parts.tokenizer(), parts.text_encoder(), {}, {{text}});
     if (stored.has("input_ids_" + which)) {
       const at::Tensor ids = stored["input_ids_" + which];
       const std::vector<int64_t> found =

@@ -7,14 +7,13 @@
 #include <c10/core/InferenceMode.h>
 
 #include "patina/base/error.h"
-#include "patina/base/files.h"
 #include "patina/base/parallel.h"
 #include "patina/diffusion/component.h"
+#include "patina/diffusion/model_parts.h"
+#include "patina/diffusion/prediction.h"
 
 namespace patina::diffusion {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Smaller networks run in f32: it is exact, and their time goes into attention and small passes, of which
 /// bf16 takes no more than a third off (small model, 96² latents, two cores with AMX: 1.8 against 1.2
@@ -24,23 +23,11 @@ constexpr uintmax_t kLargeWeightBytes = 400'000'000;
 
 /// bf16 pays where the processor multiplies it natively and the networks are large enough to be bound by
 /// arithmetic.
-Dtype resolve(Dtype wanted, const fs::path& unet_folder) {
+Dtype resolve(Dtype wanted, const TensorTable& unet) {
   if (wanted != Dtype::kAuto) return wanted;
-  const bool native = __builtin_cpu_supports("avx512bf16");
-  return native && fs::file_size(weight_file(unet_folder)) >= kLargeWeightBytes ? Dtype::kBf16 : Dtype::kF32;
-}
-
-fs::path component(const fs::path& given, const fs::path& model, const char* name) {
-  const fs::path folder = given.empty() ? model / name : given;
-  if (fs::is_directory(folder)) return folder;
-  nn::refuse_pickle_name(folder);
-  if (fs::is_regular_file(folder)) {
-    throw Error(
-        ErrorCode::kUnsupported, folder.string(),
-        "is a single file; expected the folder of a diffusers component, with config.json and its weights");
-  }
-  throw Error(ErrorCode::kNotFound, folder.string(),
-              "does not exist; expected the folder of the model's " + std::string(name));
+  uintmax_t bytes = 0;
+  for (const auto& [name, tensor] : unet.tensors) bytes += tensor.entry.bytes.size();
+  return __builtin_cpu_supports("avx512bf16") && bytes >= kLargeWeightBytes ? Dtype::kBf16 : Dtype::kF32;
 }
 
 /// The networks must fit each other: what one gives is what the next takes.
@@ -91,26 +78,27 @@ Model::Model(const ModelPaths& paths, const ModelOptions& options) {
     throw Error(ErrorCode::kUsage, "threads",
                 "is " + std::to_string(options.num_threads) + ", expected 0 (all) or more");
   }
-  if (!fs::exists(paths.model)) {
-    throw Error(ErrorCode::kNotFound, paths.model.string(),
-                "does not exist; expected a model folder in the diffusers layout");
-  }
-  nn::refuse_pickle_name(paths.model);
   set_num_threads(options.num_threads);
   at::set_num_threads(patina::num_threads());
 
   const c10::InferenceMode inference;
-  const fs::path unet = component({}, paths.model, "unet");
-  const Dtype dtype = resolve(options.dtype, unet);
+  const ModelParts parts = find_model_parts(paths);
+  const Dtype dtype = resolve(options.dtype, parts.unet.table);
   const at::ScalarType type = dtype == Dtype::kBf16 ? at::kBFloat16 : at::kFloat;
-  state_ = std::unique_ptr<State>(
-      new State{dtype, Tokenizer(component({}, paths.model, "tokenizer")),
-                TextEncoder(component({}, paths.model, "text_encoder"), type), UNet(unet, type),
-                Vae(component(paths.vae, paths.model, "vae"), at::kFloat),
-                ControlNet(component(paths.controlnet_tile, paths.model, "controlnet_tile"), type),
-                ControlNet(component(paths.controlnet_normal, paths.model, "controlnet_normal"), type),
-                read_scheduler_config(component({}, paths.model, "scheduler"))});
+  state_ = std::unique_ptr<State>(new State{
+      dtype, Tokenizer(parts.tokenizer, parts.pad_id),
+      load_network<TextEncoder>(parts.text_encoder, type, &parts.loras.text_encoder),
+      load_network<UNet>(parts.unet, type, &parts.loras.unet), load_network<Vae>(parts.vae, at::kFloat),
+      load_network<ControlNet>(parts.controlnet_tile, type),
+      load_network<ControlNet>(parts.controlnet_normal, type), parts.scheduler,
+      load_words(parts.words, parts.text_encoder.config, type), parts.notes});
   check_fit(*state_);
+  if (parts.ask_prediction) {
+    state_->scheduler.prediction = ask_prediction(state_->unet, state_->scheduler);
+    state_->notes.push_back(std::string("the U-Net predicts ") +
+                            (state_->scheduler.prediction == Prediction::kV ? "v" : "noise") +
+                            " by its answer to noise (--prediction says otherwise)");
+  }
 }
 
 Model::~Model() = default;
@@ -134,24 +122,13 @@ std::string Model::description() const {
     std::snprintf(text, sizeof text, "%.1f M", static_cast<double>(count) * 1e-6);
     return std::string(text);
   };
-  return std::string(s.unet.config().use_linear_projection ? "Stable Diffusion 2.x"
-                                                           : "Stable Diffusion 1.x") +
-         " architecture, U-Net " + millions(s.unet.num_parameters()) + ", ControlNets 2 × " +
+  std::string notes;
+  for (const std::string& note : s.notes) notes += "; " + note;
+  return std::string(name_of(family_of(s.unet.config()))) + " architecture, U-Net " +
+         millions(s.unet.num_parameters()) + ", ControlNets 2 × " +
          millions(s.controlnet_tile.num_parameters()) + ", VAE " + millions(s.vae.num_parameters()) +
          ", text encoder " + millions(s.text_encoder.num_parameters()) + " parameters, " +
-         (s.dtype == Dtype::kBf16 ? "bf16" : "f32");
-}
-
-at::Tensor encode_text(const Tokenizer& tokenizer, const TextEncoder& text_encoder, const std::string& text) {
-  const size_t length =
-      std::min(tokenizer.max_length(), static_cast<size_t>(text_encoder.config().max_positions));
-  const std::vector<int64_t> ids = tokenizer.encode_padded(text, length);
-  return text_encoder(at::tensor(ids, at::kLong).unsqueeze(0)).last_hidden_state;
-}
-
-SchedulerConfig read_scheduler_config(const fs::path& folder) {
-  const fs::path file = folder / "scheduler_config.json";
-  return parse_scheduler_config(read_text_file(file, 1 << 24), file.string());
+         (s.dtype == Dtype::kBf16 ? "bf16" : "f32") + notes;
 }
 
 }  // namespace patina::diffusion

@@ -7,7 +7,7 @@
 #include "patina/diffusion/controlnet.h"
 #include "patina/diffusion/detail.h"
 #include "patina/diffusion/schedulers.h"
-#include "patina/diffusion/text_encoder.h"
+#include "patina/diffusion/text_conditioning.h"
 #include "patina/diffusion/tokenizer.h"
 #include "patina/diffusion/unet.h"
 #include "patina/diffusion/vae.h"
@@ -22,12 +22,8 @@ struct Model::State {
   Vae vae;  // always f32: decoding is a hundredth of the work, and the pixels show its rounding
   ControlNet controlnet_tile, controlnet_normal;
   SchedulerConfig scheduler;
+  LearnedWords words;
+  std::vector<std::string> notes;  // what was chosen without being told to, for the description
 };
-
-/// The text as the U-Net sees it: [1,T,D].
-at::Tensor encode_text(const Tokenizer& tokenizer, const TextEncoder& text_encoder, const std::string& text);
-
-/// <folder>/scheduler_config.json.
-SchedulerConfig read_scheduler_config(const std::filesystem::path& folder);
 
 }  // namespace patina::diffusion

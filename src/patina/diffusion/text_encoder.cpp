@@ -74,21 +74,29 @@ TextEncoder::TextEncoder(const TextEncoderConfig& config, nn::WeightReader& weig
 }
 
 TextEncoder::TextEncoder(const std::filesystem::path& folder, at::ScalarType type)
-    : TextEncoder(load_network<TextEncoder>(read_text_encoder_config(folder), folder, type)) {}
+    : TextEncoder(load_network<TextEncoder>(open_text_encoder(folder), type)) {}
 
-TextEncoding TextEncoder::operator()(const at::Tensor& ids, int64_t clip_skip,
-                                     const nn::Recorder& record) const {
+TextEncoding TextEncoder::operator()(const at::Tensor& ids, int64_t clip_skip, const nn::Recorder& record,
+                                     const at::Tensor& learned) const {
   PATINA_CHECK_EQ(ids.dim(), 2);
   PATINA_CHECK_LE(ids.size(1), config_.max_positions);
   PATINA_CHECK(clip_skip >= 1 && clip_skip <= config_.num_layers);
-  if (ids.min().item<int64_t>() < 0 || ids.max().item<int64_t>() >= config_.vocab_size) {
+  const int64_t num_learned = learned.defined() ? learned.size(0) : 0;
+  if (ids.min().item<int64_t>() < 0 || ids.max().item<int64_t>() >= config_.vocab_size + num_learned) {
     throw Error(ErrorCode::kFormat, "text encoder",
                 "the tokenizer gives the id " + std::to_string(ids.max().item<int64_t>()) +
                     ", but the text encoder knows " + std::to_string(config_.vocab_size) +
                     " tokens: they belong to different models");
   }
-  at::Tensor h = record("text_model.embeddings",
-                        at::embedding(token_embedding_, ids) + position_embedding_.slice(0, 0, ids.size(1)));
+  // Learned words take their place among the tokens' vectors; for the search of the end token they are 0.
+  const at::Tensor is_learned = ids.ge(config_.vocab_size);
+  const at::Tensor known = num_learned > 0 ? ids.masked_fill(is_learned, 0) : ids;
+  at::Tensor vectors = at::embedding(token_embedding_, known);
+  if (num_learned > 0) {
+    const at::Tensor rows = (ids - config_.vocab_size).clamp(0);
+    vectors = at::where(is_learned.unsqueeze(-1), at::embedding(learned, rows), vectors);
+  }
+  at::Tensor h = record("text_model.embeddings", vectors + position_embedding_.slice(0, 0, ids.size(1)));
   const auto num_layers = layers_.size() - static_cast<size_t>(clip_skip - 1);
   for (size_t i = 0; i < num_layers; ++i) h = layers_[i](h, record);
   h = final_layer_norm_(h, record);
@@ -96,8 +104,9 @@ TextEncoding TextEncoder::operator()(const at::Tensor& ids, int64_t clip_skip,
   // The end token: the first one of its id. Configurations of old files give 2, which is wrong; there the
   // largest id is it.
   constexpr int64_t kWrongEos = 2;
-  const at::Tensor end =
-      config_.eos_token_id == kWrongEos ? ids.argmax(1) : ids.eq(config_.eos_token_id).to(at::kInt).argmax(1);
+  const at::Tensor end = config_.eos_token_id == kWrongEos
+                             ? known.argmax(1)
+                             : known.eq(config_.eos_token_id).to(at::kInt).argmax(1);
   return {h, h.index({at::arange(ids.size(0), ids.options()), end})};
 }
 

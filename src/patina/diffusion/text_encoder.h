@@ -50,9 +50,9 @@ class TextEncoder {
   TextEncoder(const std::filesystem::path& folder, at::ScalarType type);
 
   /// ids [B,T] int64, T <= max_positions. `clip_skip` 1 runs all layers; n leaves out the last n - 1 before
-  /// the final norm.
-  TextEncoding operator()(const at::Tensor& ids, int64_t clip_skip = 1,
-                          const nn::Recorder& record = {}) const;
+  /// the final norm. `learned` [n,D], may be undefined, holds the vectors of the ids beyond the vocabulary.
+  TextEncoding operator()(const at::Tensor& ids, int64_t clip_skip = 1, const nn::Recorder& record = {},
+                          const at::Tensor& learned = {}) const;
 
   const TextEncoderConfig& config() const { return config_; }
   int64_t num_parameters() const { return num_parameters_; }

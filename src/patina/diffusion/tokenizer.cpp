@@ -92,22 +92,12 @@ size_t word_length(std::u32string_view text, std::initializer_list<std::u32strin
 
 }  // namespace
 
-Tokenizer::Tokenizer(const std::filesystem::path& folder) : byte_symbols_(byte_alphabet()) {
-  const std::filesystem::path vocabulary_file = folder / "vocab.json", merges_file = folder / "merges.txt";
-  const Json vocabulary = read_json(vocabulary_file);
-  for (const auto& [token, id] : vocabulary.items()) {
-    if (!id.is_number_unsigned() || id.get<uint64_t>() > std::numeric_limits<int32_t>::max()) {
-      throw Error(ErrorCode::kFormat, vocabulary_file.string(),
-                  "token '" + printable(token, 40) + "' has the id " + printable(id.dump(), 40) +
-                      ", expected an unsigned integer");
-    }
-    vocabulary_[token] = id.get<int64_t>();
-  }
-
-  // Merges, one a line, best first, after a line with the version. The count is bounded as CLIP's own code
-  // bounds it.
+/// Merges, one a line, best first, after a line with the version. The count is bounded as CLIP's own code
+/// bounds it.
+std::vector<std::string> Tokenizer::read_merges(const std::filesystem::path& file) {
+  std::vector<std::string> merged;
   constexpr int kMaxMerges = 49152 - 256 - 2;
-  std::istringstream merges(read_text_file(merges_file, kMaxFileBytes));
+  std::istringstream merges(read_text_file(file, kMaxFileBytes));
   std::string line;
   std::getline(merges, line);
   for (int rank = 0; rank < kMaxMerges && std::getline(merges, line); ++rank) {
@@ -115,16 +105,53 @@ Tokenizer::Tokenizer(const std::filesystem::path& folder) : byte_symbols_(byte_a
     if (line.empty()) continue;
     const size_t space = line.find(' ');
     if (space == std::string::npos || line.find(' ', space + 1) != std::string::npos) {
-      throw Error(ErrorCode::kFormat, merges_file.string(),
+      throw Error(ErrorCode::kFormat, file.string(),
                   "line " + std::to_string(rank + 2) + " is '" + printable(line, 40) +
                       "', expected two symbols with a space between");
     }
     ranks_.insert_or_assign({line.substr(0, space), line.substr(space + 1)}, rank);
+    merged.push_back(line.substr(0, space) + line.substr(space + 1));
+  }
+  return merged;
+}
+
+Tokenizer::Tokenizer(const std::filesystem::path& path, std::optional<int64_t> pad_id)
+    : byte_symbols_(byte_alphabet()) {
+  const bool is_folder = std::filesystem::is_directory(path);
+  const std::filesystem::path folder = is_folder ? path : path.parent_path();
+  const std::filesystem::path vocabulary_file = folder / "vocab.json";
+  const std::filesystem::path merges_file = is_folder ? path / "merges.txt" : path;
+  if (is_folder && std::filesystem::exists(vocabulary_file)) {
+    const Json vocabulary = read_json(vocabulary_file);
+    for (const auto& [token, id] : vocabulary.items()) {
+      if (!id.is_number_unsigned() || id.get<uint64_t>() > std::numeric_limits<int32_t>::max()) {
+        throw Error(ErrorCode::kFormat, vocabulary_file.string(),
+                    "token '" + printable(token, 40) + "' has the id " + printable(id.dump(), 40) +
+                        ", expected an unsigned integer");
+      }
+      vocabulary_[token] = id.get<int64_t>();
+    }
+    read_merges(merges_file);
+  } else {
+    const std::vector<std::string> merged = read_merges(merges_file);
+    // Bytes in the order of their symbols: those that stand for themselves first.
+    std::vector<std::string> symbols(byte_symbols_.begin(), byte_symbols_.end());
+    std::sort(symbols.begin(), symbols.end(), [](const std::string& a, const std::string& b) {
+      return unicode::from_utf8(a) < unicode::from_utf8(b);
+    });
+    const auto add = [&](const std::string& token) {
+      vocabulary_.emplace(token, static_cast<int64_t>(vocabulary_.size()));
+    };
+    for (const std::string& symbol : symbols) add(symbol);
+    for (const std::string& symbol : symbols) add(symbol + std::string(kWordEnd));
+    for (const std::string& symbol : merged) add(symbol);
+    add("<|startoftext|>");
+    add("<|endoftext|>");
   }
 
   Json config = Json::object();
   for (const char* name : {"special_tokens_map.json", "tokenizer_config.json"}) {
-    if (std::filesystem::exists(folder / name)) config.update(read_json(folder / name));
+    if (is_folder && std::filesystem::exists(folder / name)) config.update(read_json(folder / name));
   }
   // An empty token would cut the text forever, so none may be empty.
   const auto special = [&](const char* key, const char* absent) {
@@ -140,6 +167,7 @@ Tokenizer::Tokenizer(const std::filesystem::path& folder) : byte_symbols_(byte_a
   end_ = special("eos_token", "<|endoftext|>");
   pad_ = special("pad_token", "<|endoftext|>");
   unknown_ = special("unk_token", "<|endoftext|>");
+  if (pad_id) pad_.id = *pad_id;
   if (config.contains("model_max_length") && config["model_max_length"].is_number_unsigned()) {
     max_length_ =
         static_cast<size_t>(std::clamp<uint64_t>(config["model_max_length"].get<uint64_t>(), 2, 4096));
@@ -199,8 +227,8 @@ void Tokenizer::append_text(std::vector<int64_t>& ids, std::string_view text) co
   }
 }
 
-std::vector<int64_t> Tokenizer::encode(std::string_view text) const {
-  std::vector<int64_t> ids{begin_.id};
+std::vector<int64_t> Tokenizer::tokens(std::string_view text) const {
+  std::vector<int64_t> ids;
   // Special tokens cut the text before anything else looks at it.
   while (!text.empty()) {
     const size_t begin_at = text.find(begin_.text), end_at = text.find(end_.text);
@@ -211,6 +239,12 @@ std::vector<int64_t> Tokenizer::encode(std::string_view text) const {
     ids.push_back(token.id);
     text.remove_prefix(at + token.text.size());
   }
+  return ids;
+}
+
+std::vector<int64_t> Tokenizer::encode(std::string_view text) const {
+  std::vector<int64_t> ids = tokens(text);
+  ids.insert(ids.begin(), begin_.id);
   ids.push_back(end_.id);
   return ids;
 }

@@ -155,7 +155,7 @@ UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.
 }
 
 UNet::UNet(const std::filesystem::path& folder, at::ScalarType type)
-    : UNet(load_network<UNet>(read_unet_config(folder), folder, type)) {}
+    : UNet(load_network<UNet>(open_unet(folder), type)) {}
 
 at::Tensor UNet::operator()(const UNetInputs& inputs, const nn::Recorder& record) const {
   const UNetConfig& config = encoder_.config;

@@ -132,7 +132,7 @@ Vae::Vae(const VaeConfig& config, nn::WeightReader& weights) : type_(weights.typ
 }
 
 Vae::Vae(const std::filesystem::path& folder, at::ScalarType type)
-    : Vae(load_network<Vae>(read_vae_config(folder), folder, type)) {}
+    : Vae(load_network<Vae>(open_vae(folder), type)) {}
 
 Posterior Vae::encode(const at::Tensor& image, const nn::Recorder& record) const {
   PATINA_CHECK_EQ(image.dim(), 4);

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <optional>
 
@@ -343,34 +344,70 @@ const TensorEntry* SafeTensors::find(std::string_view name) const {
   return found == index_.end() ? nullptr : &tensors_[found->second];
 }
 
-void write_safetensors(const std::filesystem::path& path, std::span<const TensorEntry> tensors,
-                       const std::map<std::string, std::string>& metadata) {
+namespace {
+
+/// Length field and header, padded so that the data begin at a multiple of 64 bytes; and the bytes that the
+/// data take.
+std::pair<std::string, uint64_t> header_of(std::span<const TensorPlan> tensors,
+                                           const std::map<std::string, std::string>& metadata) {
   nlohmann::ordered_json header = nlohmann::ordered_json::object();
   if (!metadata.empty()) header["__metadata__"] = metadata;
   uint64_t position = 0;
-  for (const TensorEntry& tensor : tensors) {
-    const std::vector<uint64_t> shape(tensor.shape.begin(), tensor.shape.end());
-    const std::optional<uint64_t> count = element_count(shape);
-    PATINA_CHECK(count && *count * static_cast<uint64_t>(bytes_of(tensor.type)) == tensor.bytes.size());
+  for (const TensorPlan& tensor : tensors) {
+    const std::optional<uint64_t> count =
+        element_count(std::vector<uint64_t>(tensor.shape.begin(), tensor.shape.end()));
+    PATINA_CHECK(count.has_value());
     PATINA_CHECK(!header.contains(tensor.name));
-    header[tensor.name] = {{"dtype", name_of(tensor.type)},
-                           {"shape", tensor.shape},
-                           {"data_offsets", {position, position + tensor.bytes.size()}}};
-    position += tensor.bytes.size();
+    const uint64_t end = position + *count * static_cast<uint64_t>(bytes_of(tensor.type));
+    header[tensor.name] = {
+        {"dtype", name_of(tensor.type)}, {"shape", tensor.shape}, {"data_offsets", {position, end}}};
+    position = end;
   }
   std::string text = header.dump();
   text.append((64 - (8 + text.size()) % 64) % 64, ' ');
-
-  std::vector<uint8_t> bytes(8 + text.size() + position);
   const uint64_t header_bytes = text.size();
-  std::memcpy(bytes.data(), &header_bytes, 8);
-  std::memcpy(bytes.data() + 8, text.data(), text.size());
-  uint8_t* out = bytes.data() + 8 + text.size();
-  for (const TensorEntry& tensor : tensors) {
-    if (!tensor.bytes.empty()) std::memcpy(out, tensor.bytes.data(), tensor.bytes.size());
-    out += tensor.bytes.size();
-  }
-  write_file(path, bytes);
+  std::string length(8, '\0');
+  std::memcpy(length.data(), &header_bytes, 8);
+  return {length + text, position};
+}
+
+}  // namespace
+
+void write_safetensors(const std::filesystem::path& path, std::span<const TensorEntry> tensors,
+                       const std::map<std::string, std::string>& metadata) {
+  std::vector<TensorPlan> plans;
+  for (const TensorEntry& tensor : tensors) plans.push_back({tensor.name, tensor.type, tensor.shape});
+  size_t next = 0;
+  const auto copy = [&](const TensorPlan&, std::span<uint8_t> bytes) {
+    const TensorEntry& tensor = tensors[next++];
+    PATINA_CHECK_EQ(tensor.bytes.size(), bytes.size());
+    std::copy(tensor.bytes.begin(), tensor.bytes.end(), bytes.begin());
+  };
+  write_safetensors(path, plans, copy, metadata);
+}
+
+void write_safetensors(const std::filesystem::path& path, std::span<const TensorPlan> tensors,
+                       const std::function<void(const TensorPlan&, std::span<uint8_t>)>& fill,
+                       const std::map<std::string, std::string>& metadata) {
+  const auto [header, data_bytes] = header_of(tensors, metadata);
+  write_file_with(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream file(temporary, std::ios::binary | std::ios::trunc);
+    const auto write = [&](const void* bytes, size_t size) {
+      file.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
+    };
+    write(header.data(), header.size());
+    std::vector<uint8_t> buffer;
+    for (const TensorPlan& tensor : tensors) {
+      if (!fill) break;
+      const std::vector<uint64_t> shape(tensor.shape.begin(), tensor.shape.end());
+      buffer.assign(*element_count(shape) * static_cast<uint64_t>(bytes_of(tensor.type)), 0);
+      fill(tensor, buffer);
+      write(buffer.data(), buffer.size());
+    }
+    file.close();
+    if (!file) throw Error(ErrorCode::kIo, path.string(), "cannot be written; is the disk full?");
+    std::filesystem::resize_file(temporary, header.size() + data_bytes);
+  });
 }
 
 }  // namespace patina::nn

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -80,8 +81,20 @@ class SafeTensors {
 /// .pt .bin .pkl).
 void refuse_pickle_name(const std::filesystem::path& path);
 
+/// A tensor that is yet to be written.
+struct TensorPlan {
+  std::string name;
+  ElementType type = ElementType::kF32;
+  std::vector<int64_t> shape;
+};
+
 /// Writes the tensors in the given order, atomically; the data begins at a multiple of 64 bytes.
 void write_safetensors(const std::filesystem::path& path, std::span<const TensorEntry> tensors,
+                       const std::map<std::string, std::string>& metadata = {});
+/// The same one tensor at a time, for files larger than memory: `fill` gives each tensor's bytes into a
+/// buffer of its size. Without `fill` the data are zeros that take no place on disk.
+void write_safetensors(const std::filesystem::path& path, std::span<const TensorPlan> tensors,
+                       const std::function<void(const TensorPlan&, std::span<uint8_t>)>& fill,
                        const std::map<std::string, std::string>& metadata = {});
 
 }  // namespace patina::nn

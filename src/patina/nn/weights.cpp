@@ -50,13 +50,16 @@ std::string list_text(const std::vector<std::string>& items) {
 
 }  // namespace
 
+void require_float(const SafeTensors& file, const TensorEntry& entry) {
+  if (at::isFloatingType(scalar_type(file, entry))) return;
+  throw Error(ErrorCode::kUnsupported, file.path().string(),
+              "tensor " + printable(entry.name, 80) + " holds " + std::string(name_of(entry.type)) +
+                  ", expected weights of F32, F16 or BF16");
+}
+
 at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::ScalarType type) {
   const at::ScalarType stored = scalar_type(file, entry);
-  if (at::isFloatingType(type) && !at::isFloatingType(stored)) {
-    throw Error(ErrorCode::kUnsupported, file.path().string(),
-                "tensor " + printable(entry.name, 80) + " holds " + std::string(name_of(entry.type)) +
-                    ", expected weights of F32, F16 or BF16");
-  }
+  if (at::isFloatingType(type)) require_float(file, entry);
   if (entry.bytes.empty()) return at::empty(entry.shape, type);
 
   // The map is read-only; nothing writes through these tensors.
@@ -84,13 +87,13 @@ std::vector<std::string> FileWeights::names() const {
 at::Tensor WeightReader::take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type) {
   const at::Tensor tensor = source_.find(name, shape, type);
   if (!tensor.defined()) {
-    missing_.push_back(name + " " + shape_text(shape));
+    missing_.push_back(source_.stored_name(name) + " " + shape_text(shape));
     return at::zeros(shape, type);
   }
   taken_.push_back(name);
   if (tensor.sizes() != shape) {
-    misshapen_.push_back(name + " (expected " + shape_text(shape) + ", found " + shape_text(tensor.sizes()) +
-                         ")");
+    misshapen_.push_back(source_.stored_name(name) + " (expected " + shape_text(shape) + ", found " +
+                         shape_text(tensor.sizes()) + ")");
     return at::zeros(shape, type);
   }
   num_parameters_ += tensor.numel();
@@ -115,7 +118,7 @@ void WeightReader::finish() const {
     }
     if (!unused.empty()) {
       add(std::to_string(unused.size()) +
-          " tensors do not belong to the network that config.json describes: " + list_text(unused));
+          " tensors do not belong to a network of this configuration: " + list_text(unused));
     }
   }
   if (!text.empty()) throw Error(ErrorCode::kFormat, source_.where(), text);

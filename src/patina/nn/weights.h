@@ -16,6 +16,8 @@ namespace patina::nn {
 /// keeps the map alive; else it is one conversion. Throws Error{kUnsupported} for elements that are no F32,
 /// F16, BF16 or F64 if `type` is a floating type; otherwise integers become `type` too.
 at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::ScalarType type);
+/// Throws as read_tensor does for weights, without reading.
+void require_float(const SafeTensors& file, const TensorEntry& entry);
 
 /// Where the tensors of a network come from.
 class WeightSource {
@@ -28,6 +30,8 @@ class WeightSource {
   /// that the network asks for.
   virtual at::Tensor find(const std::string& name, at::IntArrayRef expected, at::ScalarType type) = 0;
   virtual std::vector<std::string> names() const = 0;
+  /// For messages: the name under which the file holds (or would hold) the tensor.
+  virtual std::string stored_name(const std::string& name) const { return name; }
 };
 
 /// A weight file. `file` must outlive it, not the tensors.

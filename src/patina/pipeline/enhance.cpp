@@ -32,9 +32,8 @@ void check_inputs(const Config& config) {
                             config.orbit.resolution));
   if (config.model.model.empty())
     throw Error(ErrorCode::kUsage, "--model",
-                "give a diffusion model: a folder in the diffusers layout, such as Stable Diffusion 1.5 with "
-                "the tile and "
-                "normalbae ControlNets in controlnet_tile/ and controlnet_normal/");
+                "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x "
+                "or 2.x; `patina models DIR` lists those in a folder");
   diffusion::check_model(config.model);
   if (config.output.empty()) return;
   const std::string extension = config.output.extension().string();

@@ -13,10 +13,12 @@ namespace {
 using correspond::NoiseMode;
 using diffusion::BiasScaling;
 using diffusion::Dtype;
+using diffusion::PredictionChoice;
 using diffusion::Scheduler;
 using render::BsdfModel;
 using namespace option_kinds;
 using nlohmann::json;
+namespace fs = std::filesystem;
 
 Option elevations_option() {
   Option option{
@@ -139,6 +141,49 @@ Option fit_option() {
   return option;
 }
 
+/// FILE or FILE:WEIGHT; a file's name may hold colons itself.
+diffusion::LoraChoice parse_lora(const Option& option, const std::string& text) {
+  const size_t colon = text.rfind(':');
+  if (colon == std::string::npos || fs::exists(text)) return {text, 1.0f};
+  const std::string number = text.substr(colon + 1);
+  if (colon == 0 || number.empty()) refuse(option, "FILE or FILE:WEIGHT", text);
+  return {text.substr(0, colon), parse_number(option, number, -10.0f, 10.0f)};
+}
+
+Option loras_option(const std::string& group) {
+  Option option{.name = "lora",
+                .aliases = {},
+                .group = group,
+                .placeholder = "FILE:WEIGHT",
+                .help = "LoRA to merge into the model, and how much of it; may be given several times.",
+                .default_text = "none",
+                .stages = kDetailStage,
+                .is_list = true};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    c.model.loras.clear();
+    for (const std::string& text : v) c.model.loras.push_back(parse_lora(named, text));
+  };
+  option.get = [](const Config& c) {
+    json list = json::array();
+    for (const diffusion::LoraChoice& lora : c.model.loras)
+      list.push_back(fmt::format("{}:{}", lora.file.string(), lora.weight));
+    return list;
+  };
+  return option;
+}
+
+Option paths_option(Option option, std::vector<fs::path>& (*member)(Config&)) {
+  option.is_list = true;
+  option.set = [member](Config& c, Values v) { member(c).assign(v.begin(), v.end()); };
+  option.get = [member](const Config& c) {
+    json list = json::array();
+    for (const fs::path& path : member(const_cast<Config&>(c))) list.push_back(path.string());
+    return list;
+  };
+  return option;
+}
+
 std::vector<Option> make_options() {
   const std::string io = "Input and output", views = "Views", model = "Model", edit = "Edit",
                     priors = "Consistency between views", fit = "Inverse rendering", machine = "Machine";
@@ -239,37 +284,96 @@ std::vector<Option> make_options() {
       {.name = "model",
        .aliases = {"-m"},
        .group = model,
-       .placeholder = "DIR",
-       .help = "Diffusion model: a folder in the diffusers layout (Stable Diffusion 1.5 and its kin).",
+       .placeholder = "PATH",
+       .help =
+           "Diffusion model (Stable Diffusion 1.x or 2.x): a diffusers folder, a .safetensors checkpoint, or "
+           "the name of one in the model folders.",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.model.model; }));
   add(text_option(
       {.name = "controlnet-tile",
        .aliases = {},
        .group = model,
-       .placeholder = "DIR",
-       .help = "ControlNet that is given the render.",
-       .default_text = "MODEL/controlnet_tile",
+       .placeholder = "PATH",
+       .help = "ControlNet that is given the render: a diffusers folder, a .safetensors file or a name.",
+       .default_text = "MODEL/controlnet_tile, else by name in the model folders",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.model.controlnet_tile; }));
   add(text_option(
       {.name = "controlnet-normal",
        .aliases = {},
        .group = model,
-       .placeholder = "DIR",
-       .help = "ControlNet that is given the normals.",
-       .default_text = "MODEL/controlnet_normal",
+       .placeholder = "PATH",
+       .help = "ControlNet that is given the normals: a diffusers folder, a .safetensors file or a name.",
+       .default_text = "MODEL/controlnet_normal, else by name in the model folders",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.model.controlnet_normal; }));
   add(text_option(
       {.name = "vae",
        .aliases = {},
        .group = model,
-       .placeholder = "DIR",
+       .placeholder = "PATH",
        .help = "VAE to use in place of the model's own.",
-       .default_text = "MODEL/vae",
+       .default_text = "the model's own",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.model.vae; }));
+  add(text_option(
+      {.name = "text-encoder",
+       .aliases = {},
+       .group = model,
+       .placeholder = "PATH",
+       .help = "Text encoder to use in place of the model's own.",
+       .default_text = "the model's own",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.model.text_encoder; }));
+  add(text_option(
+      {.name = "tokenizer",
+       .aliases = {},
+       .group = model,
+       .placeholder = "DIR",
+       .help = "Folder with CLIP's merges.txt and vocab.json, for checkpoints that bring none.",
+       .default_text = "the model's own, else searched (docs/models.md)",
+       .stages = kDetailStage},
+      [](Config & c) -> auto& { return c.model.tokenizer; }));
+  add(loras_option(model));
+  add(paths_option({.name = "embedding",
+                    .aliases = {},
+                    .group = model,
+                    .placeholder = "FILE",
+                    .help = "Textual inversion: its word may then stand in the prompts. Those in the model "
+                            "folders need not be named.",
+                    .default_text = "none",
+                    .stages = kDetailStage},
+                   [](Config& c) -> std::vector<fs::path>& { return c.model.embeddings; }));
+  add(paths_option(
+      {.name = "model-dir",
+       .aliases = {},
+       .group = model,
+       .placeholder = "DIR",
+       .help = "Folder of models, such as that of ComfyUI or AUTOMATIC1111, in which names are looked "
+               "for; may be given several times.",
+       .default_text = "none",
+       .stages = kDetailStage},
+      [](Config& c) -> std::vector<fs::path>& { return c.model.model_dirs; }));
+  add(number_option<int>(
+      {.name = "clip-skip",
+       .aliases = {},
+       .group = model,
+       .placeholder = "N",
+       .help = "1 runs the whole text encoder, 2 leaves out its last layer, as some fine-tunes want.",
+       .stages = kDetailStage},
+      1, 24, [](Config & c) -> auto& { return c.detail.clip_skip; }));
+  add(choice_option<PredictionChoice>(
+      {.name = "prediction",
+       .aliases = {},
+       .group = model,
+       .placeholder = "",
+       .help = "What the U-Net was trained to tell; auto finds out (docs/models.md).",
+       .stages = kDetailStage},
+      {{"auto", PredictionChoice::kAuto},
+       {"epsilon", PredictionChoice::kEpsilon},
+       {"v", PredictionChoice::kV}},
+      [](Config & c) -> auto& { return c.model.prediction; }));
   add(choice_option<Dtype>(
       {.name = "dtype",
        .aliases = {},

@@ -20,23 +20,13 @@ using nlohmann::json;
 namespace {
 
 // Weights are gigabytes: which file, how large, how old tells whether a model changed.
-std::string describe_files(const fs::path& path) {
+std::string describe_files(const std::vector<fs::path>& files) {
   std::string text;
-  const auto add = [&](const fs::path& file) {
+  for (const fs::path& file : files) {
     std::error_code ignored;
     text += fmt::format("{} {} {}\n", file.string(), fs::file_size(file, ignored),
                         fs::last_write_time(file, ignored).time_since_epoch().count());
-  };
-  if (!fs::is_directory(path)) {
-    if (!path.empty()) add(path);
-    return text;
   }
-  std::vector<fs::path> files;
-  for (const auto& entry :
-       fs::recursive_directory_iterator(path, fs::directory_options::skip_permission_denied))
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  for (const fs::path& file : files) add(file);
   return text;
 }
 
@@ -47,10 +37,7 @@ std::string detail_key(const Workbench& bench, const RenderedViews& views, const
     for (const Image& image : *images)
       key += hash_bytes(
           {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
-  const diffusion::ModelPaths& m = config.model;
-  for (const fs::path& path : {m.model, m.vae, m.controlnet_tile, m.controlnet_normal})
-    key += describe_files(path);
-  return hash_text(key);
+  return hash_text(key + describe_files(diffusion::model_files(config.model)));
 }
 
 // The view whose noise is farthest from white tells whether the noise can be trusted.

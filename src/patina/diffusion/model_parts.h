@@ -1,0 +1,39 @@
+// All parts of a model, found and opened but not loaded: which file gives each network, the tokenizer, the
+// scheduler's settings, LoRAs and learned words. No Torch here.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "patina/diffusion/detail.h"
+#include "patina/diffusion/embedding.h"
+#include "patina/diffusion/infer_config.h"
+#include "patina/diffusion/lora.h"
+#include "patina/diffusion/network_part.h"
+#include "patina/diffusion/schedulers.h"
+
+namespace patina::diffusion {
+
+struct ModelParts {
+  Family family = Family::kSd1;
+  UNetPart unet;
+  TextEncoderPart text_encoder;
+  VaePart vae;
+  ControlNetPart controlnet_tile, controlnet_normal;
+  std::filesystem::path tokenizer;
+  std::optional<int64_t> pad_id;  // of the tokenizer, where the family wants another than its files say
+  SchedulerConfig scheduler;
+  bool ask_prediction = false;  // nothing tells what the U-Net predicts: it must be asked (prediction.h)
+  LoraSet loras;
+  std::vector<LearnedWord> words;
+  std::vector<std::filesystem::path> files;  // all that was opened
+  std::vector<std::string> notes;            // what was taken from where without being told to
+};
+
+/// Finds every part in the order: what `paths` names, the model itself, the model folders. A name that is no
+/// path is looked for in the model folders. Throws Error that names what is missing or does not fit, and what
+/// to do.
+ModelParts find_model_parts(const ModelPaths& paths);
+
+}  // namespace patina::diffusion
