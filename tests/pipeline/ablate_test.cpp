@@ -128,6 +128,15 @@ TEST(Ablate, shows_every_step_with_the_numbers_of_its_run_folder) {
   EXPECT_NE(page.find("More views"), std::string::npos);
 }
 
+TEST(Ablate, leaves_out_the_papers_noise_where_told) {
+  AblationOptions options;
+  options.weights = {1.2f};
+  options.noise_paper = false;
+  std::vector<std::string> names;
+  for (const AblationStep& step : ablation_steps({}, options, "out")) names.push_back(step.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"baseline", "tile", "noise-exact", "bias-1.2"}));
+}
+
 // One ablation without a fit, which the tests share.
 class AblateEdits : public testing::Test {
  protected:
