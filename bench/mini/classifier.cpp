@@ -104,11 +104,15 @@ json try_on_edits(const Discriminant& classifier, const Composer& composer, cons
 
 }  // namespace
 
+std::string classifier_key(const fs::path& shards) {
+  return std::string(kVersion) + " " + hash_of_all(shards);
+}
+
 Classifier trained_classifier(const fs::path& shards, const fs::path& folder) {
-  const std::string key = std::string(kVersion) + " " + hash_of_all(shards);
+  const std::string key = classifier_key(shards);
   const json trained = kept_part(folder, "classifier", key, [&] { return to_json(train(shards)); });
   Classifier out{.discriminant = discriminant_from_json(trained), .trials = {}};
-  out.trials = kept_part(folder, "classifier_trials", key, [&] {
+  out.trials = kept_part(folder, kClassifierTrials, key, [&] {
     json trials;
     const Composer unseen(shards, Part::kHeldOut, Part::kHeldOut);
     trials["held_out_photographs"] =

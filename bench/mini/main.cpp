@@ -5,11 +5,12 @@
 //   bench_mini [--model DIR] [--out FILE] [--only PART ...] [--demo COMMAND]
 //
 // Parts are kept in the folder named like FILE and measured again only when what they read has changed, so a
-// killed run goes on. FILE holds the parts that have been measured, and null for the others' figures.
+// killed run goes on. FILE holds all parts that have been measured, and null for the others' figures.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -119,31 +120,34 @@ void run(const Arguments& arguments) {
     return *model;
   };
 
+  // A part that is not asked for is told all the same where it has been measured already.
   json parts = json::object();
-  if (arguments.asks_for("vae"))
-    parts["vae"] = kept_part(folder, "vae", hash_text(key + hash_of_all(arguments.shards)), [&] {
-      return measure_vae(load(), held_out_pictures(arguments, settings, assets, folder, model),
-                         folder / "vae.png");
-    });
-  if (arguments.asks_for("edits")) {
+  const auto add = [&](const std::string& part, const std::string& part_key,
+                       const std::function<json()>& work) {
+    if (arguments.asks_for(part))
+      parts[part] = kept_part(folder, part, hash_text(part_key), work);
+    else if (std::optional<json> kept = kept_result(folder, part, hash_text(part_key)))
+      parts[part] = *std::move(kept);
+  };
+
+  const std::string materials_key = classifier_key(arguments.shards);
+  add("vae", key + materials_key, [&] {
+    return measure_vae(load(), held_out_pictures(arguments, settings, assets, folder, model),
+                       folder / "vae.png");
+  });
+  add("edits", key + materials_key, [&] {
     const Classifier classifier = trained_classifier(arguments.shards, folder);
-    parts["classifier"] = classifier.trials;
-    parts["edits"] = kept_part(
-        folder, "edits_measured", hash_text(key + to_json(classifier.discriminant).dump()),
-        [&] { return measure_edits(assets, settings, classifier.discriminant, folder / "edits", model); });
-  }
+    return measure_edits(assets, settings, classifier.discriminant, folder / "edits", model);
+  });
+  if (std::optional<json> trials = kept_result(folder, kClassifierTrials, materials_key))
+    parts["classifier"] = *std::move(trials);
   model.reset();  // the priors' runs load it themselves
   // The sweep first: the pages of both lie in one folder, and the one with textures shall stay.
-  if (arguments.asks_for("sweep"))
-    parts["sweep"] = kept_part(folder, "sweep", hash_text(priors_key + json(arguments.weights).dump()), [&] {
-      return measure_sweep(assets, for_priors, arguments.weights, folder / "priors");
-    });
-  if (arguments.asks_for("ablation"))
-    parts["ablation"] = kept_part(folder, "ablation", hash_text(priors_key),
-                                  [&] { return measure_steps(assets, for_priors, folder / "priors"); });
-  if (arguments.asks_for("demo") && !arguments.demo.empty())
-    parts["demo"] = kept_part(folder, "demo", hash_text(model_hash + arguments.demo),
-                              [&] { return timed_demo(arguments.demo); });
+  add("sweep", priors_key + json(arguments.weights).dump(),
+      [&] { return measure_sweep(assets, for_priors, arguments.weights, folder / "priors"); });
+  add("ablation", priors_key, [&] { return measure_steps(assets, for_priors, folder / "priors"); });
+  if (!arguments.demo.empty())
+    add("demo", model_hash + arguments.demo, [&] { return timed_demo(arguments.demo); });
 
   const json result = {{"patina", PATINA_VERSION},
                        {"model", arguments.model.string()},

@@ -4,13 +4,18 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
 namespace patina::bench {
 
-/// The result in FOLDER/NAME.json if it was written under `key`, else what `work` returns, written there.
+/// The result in FOLDER/NAME.json if it was written under `key`.
+std::optional<nlohmann::json> kept_result(const std::filesystem::path& folder, const std::string& name,
+                                          const std::string& key);
+
+/// The same, or what `work` returns, written there.
 nlohmann::json kept_part(const std::filesystem::path& folder, const std::string& name, const std::string& key,
                          const std::function<nlohmann::json()>& work);
 
