@@ -7,6 +7,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/pipeline/bundled_model.h"
 #include "patina/pipeline/options.h"
 
 namespace patina::app {
@@ -63,11 +64,15 @@ void apply_options(const GivenOptions& given, pipeline::Config& config) {
                         printable(item.fullname())));
       if (item.inputs.empty())
         throw Error(ErrorCode::kUsage, given.config_file, fmt::format("'{}' has no value", item.name));
-      option->set(config, item.inputs);
     }
+    // In the order of the list, not of the file: a preset comes before what it would else overwrite.
+    for (const pipeline::Option& option : pipeline::options())
+      for (const CLI::ConfigItem& item : items)
+        if (item.name == option.name) option.set(config, item.inputs);
   }
   for (const auto& [name, cli] : given.options)
     if (cli->count() > 0) pipeline::find_option(name)->set(config, cli->reduced_results());
+  pipeline::settle(config);
 }
 
 void require_prompt(const pipeline::Config& config) {

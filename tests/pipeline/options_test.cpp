@@ -1,11 +1,14 @@
 // The list of options: every option can be written and read back, ranges are checked, names are unique.
 #include "patina/pipeline/options.h"
+#include "patina/pipeline/bundled_model.h"
 
 #include <set>
 
 #include <gtest/gtest.h>
 
 #include "patina/base/error.h"
+#include "patina/pipeline/bundled_model.h"
+#include "support.h"
 
 namespace patina::pipeline {
 namespace {
@@ -107,6 +110,28 @@ TEST(Options, a_stage_depends_on_what_it_reads_and_on_nothing_else) {
   set(config, "prompt", {"moss"});
   EXPECT_EQ(values_read_by(config, kRenderStage), before_render);
   EXPECT_NE(values_read_by(config, kDetailStage), before_detail);
+}
+
+TEST(Options, a_preset_gives_way_to_what_is_given_beside_it) {
+  Config config;
+  apply_json(config, {{"views", 9}, {"preset", "fast"}, {"samples", 64}}, "file.json");
+  EXPECT_EQ(config.orbit.num_views, 9);
+  EXPECT_EQ(config.samples_per_pixel, 64);
+  EXPECT_EQ(config.detail.num_steps, 12);
+}
+
+TEST(Options, what_is_not_given_comes_from_the_model) {
+  Config mini, tiny;
+  settle(mini);
+  EXPECT_EQ(mini.model.model.filename(), "patina-mini");
+  EXPECT_EQ(mini.orbit.resolution, 256);
+  tiny.model.model = test::data_dir() / "tiny-sd";
+  settle(tiny);
+  EXPECT_EQ(tiny.orbit.resolution, 128);
+  Config given;
+  given.orbit.resolution = 320;
+  settle(given);
+  EXPECT_EQ(given.orbit.resolution, 320);
 }
 
 TEST(Options, refuses_unknown_names_in_files) {

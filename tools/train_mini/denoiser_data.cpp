@@ -114,11 +114,11 @@ DenoiserBatch DenoiserData::draw(Cut cut, int64_t count, std::mt19937_64& random
     normals.push_back(tiled(view_normals));
     const std::string& caption = samples_.samples()[static_cast<size_t>(first)].caption;
     const std::string said = vary && !caption.empty() ? with_noise_words(caption, random) : caption;
-    const std::vector<int64_t> tokens = tokenizer_.encode_padded(said, static_cast<size_t>(length_));
+    const std::vector<int64_t> tokens = tokenizer_.encode_padded(said, tokenizer_.max_length());
     ids.insert(ids.end(), tokens.begin(), tokens.end());
   }
   return {at::stack(latents), at::stack(tiles), at::stack(normals),
-          at::tensor(ids, at::kLong).view({count, length_})};
+          at::tensor(ids, at::kLong).view({count, -1})};
 }
 
 }  // namespace patina::train_mini

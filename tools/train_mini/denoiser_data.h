@@ -36,7 +36,7 @@ class DenoiserData {
   SampleFolder samples_;
   MappedFile latents_;
   diffusion::Tokenizer tokenizer_;
-  int64_t channels_ = 0, latent_side_ = 0, length_ = 77;
+  int64_t channels_ = 0, latent_side_ = 0;
   double scaling_factor_ = 1;
   std::vector<int64_t> singles_, groups_;  // indices of all samples, and of the first of each group of four
 };

@@ -15,7 +15,6 @@
 #include "parameters.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/controlnet.h"
-#include "patina/diffusion/model.h"
 #include "patina/diffusion/schedulers.h"
 #include "patina/diffusion/text_encoder.h"
 #include "patina/diffusion/unet.h"
@@ -26,9 +25,14 @@ namespace {
 namespace fs = std::filesystem;
 using namespace diffusion;
 
-constexpr double kSnrLimit = 5;           // γ of min-SNR weighting [Hang2023]
-constexpr double kControlDropout = 0.12;  // share of samples without the one or the other condition
+constexpr double kSnrLimit = 5;  // γ of min-SNR weighting [Hang2023]
+// Share of samples without the one or the other condition. The render says so much that words are hardly
+// listened to beside it: without it they must be.
+constexpr double kTileDropout = 0.35, kNormalDropout = 0.12;
+constexpr double kNoisyShare =
+    0.5;  // of the samples have a time of the noisier part, where words decide most
 constexpr double kCheckpointSeconds = 240;
+constexpr double kAverage = 0.998;  // of a training of ten thousand steps
 
 constexpr std::array<const char*, 4> kComponents{"text_encoder", "unet", "controlnet_tile",
                                                  "controlnet_normal"};
@@ -123,7 +127,9 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     std::printf("%s: %.2f M parameters\n", store->where().c_str(),
                 static_cast<double>(store->num_parameters()) * 1e-6);
 
-  const SchedulePlan plan = make_schedule(read_scheduler_config(model / "scheduler"), 10);
+  const fs::path scheduler_file = model / "scheduler" / "scheduler_config.json";
+  const SchedulePlan plan =
+      make_schedule(parse_scheduler_config(read_text_file(scheduler_file), scheduler_file.string()), 10);
   const at::Tensor alphas_cumprod = at::tensor(plan.alphas_cumprod, at::kFloat).to(options.device);
   const fs::path step_file = work / "denoiser.step";
   Run run(options.run, work / "denoiser.log",
@@ -164,10 +170,12 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
                                               : options.grids;
     const DenoiserBatch batch = on_device(training.draw(cut, count, random, /*vary=*/true), options.device);
     const auto device = at::device(options.device);
-    const at::Tensor timesteps =
-        at::randint(0, plan.config.num_train_timesteps, {count}, device.dtype(at::kLong));
-    const at::Tensor tile_scale = (at::rand({count}, device) >= kControlDropout).to(at::kFloat);
-    const at::Tensor normal_scale = (at::rand({count}, device) >= kControlDropout).to(at::kFloat);
+    const int64_t num_times = plan.config.num_train_timesteps, noisy = num_times * 2 / 5;
+    const at::Tensor timesteps = at::where(at::rand({count}, device) < kNoisyShare,
+                                           at::randint(noisy, num_times, {count}, device.dtype(at::kLong)),
+                                           at::randint(0, num_times, {count}, device.dtype(at::kLong)));
+    const at::Tensor tile_scale = (at::rand({count}, device) >= kTileDropout).to(at::kFloat);
+    const at::Tensor normal_scale = (at::rand({count}, device) >= kNormalDropout).to(at::kFloat);
 
     const Networks networks = networks_of(stores, configs, at::kBFloat16);
     const at::Tensor errors =
@@ -175,7 +183,7 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     const at::Tensor alpha_bar = alphas_cumprod.index_select(0, timesteps);
     const at::Tensor snr = alpha_bar / (1 - alpha_bar);
     const at::Tensor loss =
-        (errors * at::clamp_max(snr, kSnrLimit) / (snr + 1)).mean() + 0.25 * (errors / (snr + 1)).mean();
+        (errors * at::clamp_max(snr, kSnrLimit) / (snr + 1)).mean() + (errors / (snr + 1)).mean();
     loss.backward();
 
     double squares = 0;
@@ -183,7 +191,7 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     const double norm = std::sqrt(squares);
     Parameters::Adam adam;
     adam.rate = run.rate();
-    adam.average = 0.9995;
+    adam.average = kAverage;
     if (std::isfinite(norm)) {
       for (const auto& store : stores) {
         if (norm > 1) store->scale_gradients(1 / norm);

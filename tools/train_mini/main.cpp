@@ -9,6 +9,7 @@
 #include "mini_data/plan.h"
 #include "patina/base/error.h"
 #include "samples.h"
+#include "sheet.h"
 #include "vae_training.h"
 
 namespace {
@@ -24,10 +25,14 @@ constexpr const char* kUsage =
     "       train_mini vae WORK MODEL [--decoder-only]        train the autoencoder\n"
     "       train_mini latents WORK MODEL                     encode the samples with it\n"
     "       train_mini denoiser WORK MODEL                    train text encoder, U-Net and ControlNets\n"
+    "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects      under fixed "
+    "prompts\n"
     "options of both trainings: --minutes M (60), --rate R, --settle (the rate falls to zero), --batch N, "
     "--cuda\n"
     "Each goes on where it was stopped or killed. MODEL holds config.json of every component and gets the "
     "weights.\n";
+
+constexpr int64_t kSheetRows = 6;
 
 struct Arguments {
   std::vector<std::string> positional;
@@ -35,6 +40,7 @@ struct Arguments {
   int64_t batch = 0;
   RunOptions run;
   double rate = 0;
+  fs::path output;
   bool decoder_only = false, cuda = false, good = true;
 };
 
@@ -59,6 +65,8 @@ Arguments parsed(int argc, char** argv) {
       out.run.settle = true;
     else if (word == "--decoder-only")
       out.decoder_only = true;
+    else if (word == "-o" && i + 1 < argc)
+      out.output = argv[++i];
     else if (word == "--cuda")
       out.cuda = true;
     else if (word.rfind("-", 0) == 0)
@@ -119,6 +127,9 @@ int run(const std::string& command, Arguments arguments) {
       options.grids = std::max<int64_t>(1, arguments.batch / 16);
     }
     train_denoiser(names[0], names[1], options);
+  } else if (command == "sheet" && names.size() == 2 && !arguments.output.empty()) {
+    write_sheet(names[0], names[1], arguments.output,
+                static_cast<int>(std::min<int64_t>(arguments.count, kSheetRows)));
   } else {
     return 2;
   }

@@ -12,6 +12,7 @@ import sys
 from tokenizers import Regex, Tokenizer, models, normalizers, pre_tokenizers, trainers
 
 VOCABULARY = 1280
+MAX_LENGTH = 32  # the longest caption takes 17
 BEGIN, END = "<|startoftext|>", "<|endoftext|>"
 # CLIP's own division of text into words.
 WORDS = r"'s|'t|'re|'ve|'m|'ll|'d|\p{L}+|\p{N}|[^\s\p{L}\p{N}]+"
@@ -54,7 +55,7 @@ def main(folder: pathlib.Path) -> None:
     (folder / "merges.txt").write_text("#version: 0.2\n" + "\n".join(merges) + "\n")
     special = {"bos_token": BEGIN, "eos_token": END, "pad_token": END, "unk_token": END}
     (folder / "special_tokens_map.json").write_text(json.dumps(special, indent=2) + "\n")
-    config = {**special, "add_prefix_space": False, "do_lower_case": True, "errors": "replace", "model_max_length": 77,
+    config = {**special, "add_prefix_space": False, "do_lower_case": True, "errors": "replace", "model_max_length": MAX_LENGTH,
               "tokenizer_class": "CLIPTokenizer"}
     (folder / "tokenizer_config.json").write_text(json.dumps(config, indent=2) + "\n")
 

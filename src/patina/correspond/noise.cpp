@@ -115,4 +115,11 @@ std::vector<NoiseField> make_noises(const render::Scene& scene, std::span<const 
   return noises;
 }
 
+uint64_t block_seed(uint64_t seed, int block) {
+  if (block == 0) return seed;
+  const auto bits = philox({static_cast<uint32_t>(block), 0, 0, static_cast<uint32_t>(RandomPurpose::kNoiseField)},
+                           {static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32)});
+  return bits[0] | static_cast<uint64_t>(bits[1]) << 32;
+}
+
 }  // namespace patina::correspond

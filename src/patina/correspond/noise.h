@@ -46,6 +46,10 @@ std::vector<NoiseField> make_noises(const render::Scene& scene, std::span<const 
                                     int latent_scale, const NoiseOptions& options,
                                     std::span<const uint64_t> seeds, const Progress& progress = {});
 
+/// Models of more than four latent channels take several fields, one after another: the seed of field `block`
+/// of a run, `seed` itself for the first.
+uint64_t block_seed(uint64_t seed, int block);
+
 /// Whiteness of one view's noise [4,h,w]: what DESIGN demands of it.
 struct NoiseStatistics {
   float mean = 0, variance = 0;

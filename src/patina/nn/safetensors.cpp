@@ -214,11 +214,13 @@ void refuse_other_formats(const std::filesystem::path& path, std::span<const uin
 }
 
 /// Number of elements; nullopt if it does not fit into 63 bits.
-std::optional<uint64_t> element_count(std::span<const uint64_t> shape) {
+template <class Integer>
+std::optional<uint64_t> element_count(const std::vector<Integer>& shape) {
   uint64_t count = 1;
-  for (const uint64_t size : shape) {
-    if (size > static_cast<uint64_t>(std::numeric_limits<int64_t>::max())) return std::nullopt;
-    if (__builtin_mul_overflow(count, size, &count)) return std::nullopt;
+  for (const auto size : shape) {
+    if (static_cast<uint64_t>(size) > static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))
+      return std::nullopt;
+    if (__builtin_mul_overflow(count, static_cast<uint64_t>(size), &count)) return std::nullopt;
   }
   if (count > static_cast<uint64_t>(std::numeric_limits<int64_t>::max())) return std::nullopt;
   return count;
@@ -354,8 +356,7 @@ std::pair<std::string, uint64_t> header_of(std::span<const TensorPlan> tensors,
   if (!metadata.empty()) header["__metadata__"] = metadata;
   uint64_t position = 0;
   for (const TensorPlan& tensor : tensors) {
-    const std::optional<uint64_t> count =
-        element_count(std::vector<uint64_t>(tensor.shape.begin(), tensor.shape.end()));
+    const std::optional<uint64_t> count = element_count(tensor.shape);
     PATINA_CHECK(count.has_value());
     PATINA_CHECK(!header.contains(tensor.name));
     const uint64_t end = position + *count * static_cast<uint64_t>(bytes_of(tensor.type));
@@ -399,8 +400,7 @@ void write_safetensors(const std::filesystem::path& path, std::span<const Tensor
     std::vector<uint8_t> buffer;
     for (const TensorPlan& tensor : tensors) {
       if (!fill) break;
-      const std::vector<uint64_t> shape(tensor.shape.begin(), tensor.shape.end());
-      buffer.assign(*element_count(shape) * static_cast<uint64_t>(bytes_of(tensor.type)), 0);
+      buffer.assign(*element_count(tensor.shape) * static_cast<uint64_t>(bytes_of(tensor.type)), 0);
       fill(tensor, buffer);
       write(buffer.data(), buffer.size());
     }

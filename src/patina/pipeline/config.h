@@ -15,7 +15,12 @@
 
 namespace patina::pipeline {
 
+/// What --preset chose; its values are written into the other fields.
+enum class Preset { kUsual, kFast, kQuality };
+
 struct Config {
+  Preset preset = Preset::kUsual;
+
   // What goes in and out.
   std::filesystem::path asset;
   std::filesystem::path output;        // empty: no export
@@ -26,7 +31,7 @@ struct Config {
   std::filesystem::path environment;  // empty: the built-in studio
   std::filesystem::path scene;        // context that is rendered and never changed; may be empty
   std::filesystem::path cameras;      // explicit cameras instead of the orbit; may be empty
-  views::OrbitOptions orbit;
+  views::OrbitOptions orbit{.resolution = 0};  // 0: what the model was trained at, see settle()
   int samples_per_pixel = 64;
   int max_depth = 6;
   std::optional<float> exposure_ev;  // nullopt: automatic

@@ -31,9 +31,10 @@ void check_inputs(const Config& config) {
                 fmt::format("expected a multiple of 64, or any multiple of 8 with --bias 0, found {}",
                             config.orbit.resolution));
   if (config.model.model.empty())
-    throw Error(ErrorCode::kUsage, "--model",
-                "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x "
-                "or 2.x; `patina models DIR` lists those in a folder");
+    throw Error(
+        ErrorCode::kUsage, "--model",
+        "patina-mini, the model that comes with patina, was not found; give a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
+        "2.x; `patina models DIR` lists those in a folder");
   diffusion::check_model(config.model);
   if (config.output.empty()) return;
   const std::string extension = config.output.extension().string();

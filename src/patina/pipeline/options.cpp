@@ -64,6 +64,53 @@ Option views_option() {
   return option;
 }
 
+Option resolution_option() {
+  Option option{
+      .name = "resolution",
+      .aliases = {},
+      .group = "Views",
+      .placeholder = "auto|PIXELS",
+      .help =
+          "Width and height of one view, pixels; a multiple of 64 (with --bias 0: of 8). auto takes "
+          "what the model was trained at: 256 for patina-mini, 512 for Stable Diffusion 1.5.",
+      .default_text = "auto",
+      .stages = kRenderStage};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    c.orbit.resolution = v.front() == "auto" ? 0 : parse_number(named, v.front(), 64, 4096);
+  };
+  option.get = [](const Config& c) {
+    return c.orbit.resolution == 0 ? json("auto") : json(c.orbit.resolution);
+  };
+  return option;
+}
+
+/// Sets several options at once. Those that are given themselves win: they come later in the list.
+Option preset_option() {
+  const Names<Preset> presets = {
+      {"usual", Preset::kUsual}, {"fast", Preset::kFast}, {"quality", Preset::kQuality}};
+  Option option = choice_option<Preset>(
+      {.name = "preset",
+       .aliases = {},
+       .group = "Edit",
+       .placeholder = "",
+       .help = "fast: 4 views, 12 steps, 80 iterations of the fit, to try prompts. quality: 16 views, 30 "
+               "steps, 400 "
+               "iterations, smoother renders. Options given beside it win."},
+      presets, [](Config & c) -> auto& { return c.preset; });
+  option.set = [choose = option.set](Config& c, Values v) {
+    choose(c, v);
+    if (c.preset == Preset::kUsual) return;
+    const bool fast = c.preset == Preset::kFast;
+    c.orbit.num_views = fast ? 4 : 16;
+    c.detail.num_steps = fast ? 12 : 30;
+    c.samples_per_pixel = fast ? 32 : 256;
+    c.fit.iterations = fast ? 80 : 400;
+    c.turntable_frames = fast ? 0 : 36;
+  };
+  return option;
+}
+
 Option exposure_option() {
   Option option{.name = "exposure",
                 .aliases = {},
@@ -196,6 +243,7 @@ std::vector<Option> make_options() {
                                        {"unipc", Scheduler::kUniPc}};
   std::vector<Option> list;
   const auto add = [&](Option option) { list.push_back(std::move(option)); };
+  add(preset_option());
 
   add(text_option(
       {.name = "prompt",
@@ -288,6 +336,7 @@ std::vector<Option> make_options() {
        .help =
            "Diffusion model (Stable Diffusion 1.x or 2.x): a diffusers folder, a .safetensors checkpoint, or "
            "the name of one in the model folders.",
+       .default_text = "patina-mini, which comes with patina",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.model.model; }));
   add(text_option(
@@ -385,14 +434,7 @@ std::vector<Option> make_options() {
       [](Config & c) -> auto& { return c.dtype; }));
 
   add(views_option());
-  add(number_option<int>(
-      {.name = "resolution",
-       .aliases = {},
-       .group = views,
-       .placeholder = "PIXELS",
-       .help = "Width and height of one view, pixels; a multiple of 64 (with --bias 0: of 8).",
-       .stages = kRenderStage},
-      64, 4096, [](Config & c) -> auto& { return c.orbit.resolution; }));
+  add(resolution_option());
   add(elevations_option());
   add(degrees_option({.name = "azimuth",
                       .aliases = {},
@@ -608,11 +650,14 @@ json to_json(const Config& config) {
 void apply_json(Config& config, const json& values, const std::string& context) {
   if (!values.is_object()) throw Error(ErrorCode::kFormat, context, "expected an object of options");
   for (const auto& [name, value] : values.items()) {
-    const Option* option = find_option(name);
-    if (!option)
+    if (!find_option(name))
       throw Error(ErrorCode::kFormat, context, fmt::format("unknown option '{}'", printable(name)));
-    const std::vector<std::string> texts = as_strings(value, context + ": " + name);
-    if (!texts.empty()) option->set(config, texts);
+  }
+  // In the order of the list, not of the file: a preset comes before what it would else overwrite.
+  for (const Option& option : options()) {
+    if (!values.contains(option.name)) continue;
+    const std::vector<std::string> texts = as_strings(values[option.name], context + ": " + option.name);
+    if (!texts.empty()) option.set(config, texts);
   }
 }
 

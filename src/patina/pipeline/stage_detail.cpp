@@ -70,15 +70,22 @@ PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views
 
   PreparedDetail prepared;
   auto start = std::chrono::steady_clock::now();
-  correspond::NoiseField noise = correspond::make_noise(
-      *bench.scene, bench.cameras, scale, {.mode = config.noise, .seed = config.seed}, progress);
+  std::vector<uint64_t> seeds;  // of fields of four channels
+  for (int block = 0; 4 * block < model.latent_channels(); ++block)
+    seeds.push_back(correspond::block_seed(config.seed, block));
+  const std::vector<correspond::NoiseField> noises =
+      correspond::make_noises(*bench.scene, bench.cameras, scale, {.mode = config.noise}, seeds, progress);
   prepared.noise_seconds = seconds_since(start);
-  prepared.noise_metrics = noise_metrics(noise, views.set.grid);
+  prepared.noise_metrics = noise_metrics(noises[0], views.set.grid);
+  std::vector<float> noise;
+  for (const correspond::NoiseField& field : noises)
+    noise.insert(noise.end(), field.values.begin(), field.values.end());
+  noise.resize(noise.size() / (4 * noises.size()) * static_cast<size_t>(model.latent_channels()));
 
   prepared.inputs = {.grid = views.set.grid,
                      .tile_views = views.tile,
                      .normal_views = views.normal,
-                     .noise = std::move(noise.values),
+                     .noise = std::move(noise),
                      .bias_levels = {}};
   if (config.detail.bias_weight != 0) {
     start = std::chrono::steady_clock::now();

@@ -1,0 +1,163 @@
+// The trainer's parts: gradients through networks that are built of its parameters, its optimiser, its files.
+#include <cmath>
+#include <fstream>
+
+#include <ATen/ATen.h>
+#include <gtest/gtest.h>
+
+#include "patina/base/files.h"
+#include "patina/diffusion/unet.h"
+#include "patina/diffusion/vae.h"
+#include "patina/nn/attend.h"
+#include "support.h"
+#include "train_mini/parameters.h"
+#include "train_mini/samples.h"
+#include "train_mini/vae_training.h"
+
+namespace patina::train_mini {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Parameters, gradients_reach_the_leaves_through_a_conversion) {
+  Parameters parameters("test", 1, c10::kCPU);
+  const at::Tensor factors = at::tensor({1.0f, -2.0f, 0.5f, 4.0f}).view({2, 2});
+  const auto loss = [&] {
+    return (parameters.find("a.weight", {2, 2}, at::kBFloat16).to(at::kFloat) * factors).sum();
+  };
+  loss().backward();
+  EXPECT_NEAR(parameters.gradient_norm(), factors.norm().item<double>(), 1e-6);
+}
+
+TEST(Parameters, one_step_is_adamw_with_decoupled_decay) {
+  Parameters parameters("test", 1, c10::kCPU);
+  const at::Tensor before = parameters.find("a.weight", {3, 5}, at::kFloat).detach().clone();
+  const at::Tensor slope = at::linspace(-1, 1, 15).view({3, 5});
+  const Parameters::Adam adam{
+      .rate = 0.01, .beta1 = 0.9, .beta2 = 0.99, .epsilon = 1e-8, .weight_decay = 0.1};
+  at::Tensor expected = before.to(at::kDouble);
+  at::Tensor first = at::zeros_like(expected), second = at::zeros_like(expected);
+  const at::Tensor g = slope.to(at::kDouble);
+  for (int64_t step = 0; step < 3; ++step) {
+    (parameters.find("a.weight", {3, 5}, at::kFloat) * slope).sum().backward();
+    parameters.step(adam, step);
+    const auto n = static_cast<double>(step + 1);
+    first = 0.9 * first + 0.1 * g;
+    second = 0.99 * second + 0.01 * g * g;
+    expected = expected * (1 - 0.01 * 0.1) -
+               0.01 * (first / (1 - std::pow(0.9, n))) / ((second / (1 - std::pow(0.99, n))).sqrt() + 1e-8);
+  }
+  const at::Tensor after = parameters.find("a.weight", {3, 5}, at::kFloat).detach();
+  EXPECT_LT((after.to(at::kDouble) - expected).abs().max().item<double>(), 1e-6);
+}
+
+TEST(Parameters, go_on_from_a_file_as_if_never_stopped) {
+  const test::TemporaryFolder folder;
+  const auto one_step = [](Parameters& parameters, int64_t step) {
+    const at::Tensor w = parameters.find("a.weight", {4, 4}, at::kFloat);
+    (w * w * static_cast<double>(step + 1)).sum().backward();
+    parameters.step({}, step);
+  };
+  Parameters straight("test", 3, c10::kCPU);
+  for (int64_t step = 0; step < 4; ++step) one_step(straight, step);
+
+  Parameters first("test", 3, c10::kCPU), second("test", 99, c10::kCPU);
+  for (int64_t step = 0; step < 2; ++step) one_step(first, step);
+  first.write(folder.path() / "half");
+  second.read(folder.path() / "half");
+  for (int64_t step = 2; step < 4; ++step) one_step(second, step);
+  const auto value = [](Parameters& p) { return p.find("a.weight", {4, 4}, at::kFloat).detach(); };
+  EXPECT_TRUE(at::equal(value(straight), value(second)));
+  straight.use_average(true), second.use_average(true);
+  EXPECT_TRUE(at::equal(value(straight), value(second)));
+}
+
+// The gradient of a whole U-Net, attention to text and image included, against finite differences.
+TEST(Parameters, gradients_of_a_network_are_the_slopes_of_its_loss) {
+  diffusion::UNetConfig config = diffusion::read_unet_config(test::data_dir() / "tiny-sd" / "unet");
+  Parameters parameters("unet", 5, c10::kCPU);
+  at::manual_seed(3);
+  const at::Tensor sample = at::randn({2, 4, 8, 8}), text = at::randn({2, 5, 64}),
+                   target = at::randn({2, 4, 8, 8});
+  const auto loss = [&] {
+    nn::WeightReader weights(parameters, at::kFloat);
+    const diffusion::UNet unet(config, weights);
+    return (unet({sample, at::tensor({10.0f, 700.0f}), text}) - target).to(at::kDouble).square().mean();
+  };
+  loss().backward();
+  for (const char* name :
+       {"conv_in.weight", "down_blocks.0.attentions.0.transformer_blocks.0.attn1.to_q.weight",
+        "mid_block.attentions.0.transformer_blocks.0.attn2.to_v.weight", "time_embedding.linear_2.weight",
+        "up_blocks.3.resnets.2.conv2.weight", "conv_norm_out.weight"}) {
+    at::Tensor weight = parameters.find(name, {}, at::kFloat);
+    const at::Tensor gradient = weight.grad().clone();
+    // Along the gradient itself the loss must rise by its square norm.
+    const at::Tensor direction = gradient / gradient.norm();
+    const c10::NoGradGuard no_gradients;
+    const double step = 2e-2;
+    weight.add_(direction, step);
+    const double above = loss().item<double>();
+    weight.add_(direction, -2 * step);
+    const double below = loss().item<double>();
+    weight.add_(direction, step);
+    const double slope = (above - below) / (2 * step), expected = gradient.norm().item<double>();
+    EXPECT_NEAR(slope, expected, 0.02 * expected + 1e-6) << name;
+  }
+}
+
+TEST(Attend, gives_the_same_with_gradients_as_without) {
+  at::manual_seed(1);
+  const at::Tensor q = at::randn({2, 33, 24}), k = at::randn({2, 17, 24}), v = at::randn({2, 17, 24});
+  const at::Tensor plain = nn::attend(q, k, v, 3);
+  const at::Tensor recorded = nn::attend(q.clone().set_requires_grad(true), k, v, 3);
+  EXPECT_TRUE(recorded.requires_grad());
+  EXPECT_LT((plain - recorded).abs().max().item<float>(), 1e-5f);
+}
+
+// Pictures of coloured bands: little, but something that can be learnt.
+void write_samples(const fs::path& folder, int count) {
+  fs::create_directories(folder);
+  std::ofstream pictures(folder / "pictures.u8", std::ios::binary), lines(folder / "samples.jsonl");
+  for (int i = 0; i < count; ++i) {
+    const at::Tensor wave = (at::sin(at::arange(256) * (0.02 * (i + 1))) * 100 + 128).to(at::kByte);
+    const at::Tensor record = wave.expand({9, 256, 256}).contiguous();
+    pictures.write(static_cast<const char*>(record.data_ptr()), record.numel());
+    lines << R"({"caption": "a band", "class": "band", "views": 1, "view": 0})"
+          << "\n";
+  }
+}
+
+TEST(SampleFolder, gives_pictures_and_captions_and_ignores_a_record_that_was_cut) {
+  const test::TemporaryFolder folder;
+  write_samples(folder.path(), 3);
+  fs::resize_file(folder.path() / "pictures.u8", 2 * 9 * 256 * 256 + 100);
+  const SampleFolder samples(folder.path());
+  ASSERT_EQ(samples.size(), 2);
+  EXPECT_EQ(samples.samples()[1].caption, "a band");
+  EXPECT_EQ(samples.pictures(0)[0][0][0][0].item<int>(), 128);
+}
+
+TEST(VaeTraining, learns_goes_on_and_leaves_a_vae_that_loads) {
+  const test::TemporaryFolder folder;
+  const fs::path work = folder.path() / "work", model = folder.path() / "model";
+  write_samples(work / "training", 4);
+  write_samples(work / "held_out", 1);
+  write_file(
+      model / "vae" / "config.json",
+      R"({"block_out_channels": [8, 8, 8], "layers_per_block": 1, "norm_num_groups": 4, "latent_channels": 4,
+                 "mid_block_add_attention": false, "use_quant_conv": false, "use_post_quant_conv": false})");
+  VaeTraining options;
+  options.batch = 2, options.side = 32;
+  options.run.minutes = 2.0 / 60;
+  train_vae(work, model, options);
+  const auto steps = [&] { return std::stoll(read_text_file(work / "vae.step")); };
+  const auto first = steps();
+  EXPECT_GT(first, 0);
+  train_vae(work, model, options);
+  EXPECT_GT(steps(), first);
+  const diffusion::Vae vae(model / "vae", at::kFloat);
+  EXPECT_EQ(vae.encode(at::zeros({1, 3, 32, 32})).mean.sizes(), at::IntArrayRef({1, 4, 8, 8}));
+}
+
+}  // namespace
+}  // namespace patina::train_mini
