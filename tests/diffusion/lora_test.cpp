@@ -126,6 +126,19 @@ TEST_F(Lora, a_core_between_the_factors_is_contracted) {
   EXPECT_LT((found - expected).abs().max().item<double>(), 1e-5);
 }
 
+TEST_F(Lora, takes_the_alpha_that_diffusers_keeps_in_the_metadata) {
+  make::write_lora(path("plain"), model_, {.naming = LoraNaming::kPeft, .rank = 4});
+  const nn::SafeTensors plain(path("plain"));
+  nn::write_safetensors(
+      path("scaled"), plain.tensors(),
+      {{"lora_adapter_metadata",
+        R"({"unet.lora_alpha": 12, "unet.r": 4, "text_encoder.lora_alpha": 2, "text_encoder.r": 4})"}});
+  const LoraSet set = match("scaled");
+  EXPECT_DOUBLE_EQ(set.unet.at(kLinear).front().scale, 3.0);
+  EXPECT_DOUBLE_EQ(set.text_encoder.begin()->second.front().scale, 0.5);
+  EXPECT_DOUBLE_EQ(match("plain").unet.at(kLinear).front().scale, 1.0);
+}
+
 TEST_F(Lora, several_add_up) {
   make::write_lora(path("a"), model_, {});
   make::Model other = model_;

@@ -52,8 +52,9 @@ size_t count_not_finite(const nn::TensorEntry& entry) {
   }
 }
 
-const char* name_of(Naming naming) {
-  switch (naming) {
+const char* names_text(const TensorTable& table) {
+  if (table.network == Network::kTextEncoder && table.naming != Naming::kOpenClip) return "CLIP's names";
+  switch (table.naming) {
     case Naming::kLdm:
       return "LDM's names";
     case Naming::kOpenClip:
@@ -70,8 +71,7 @@ std::string checked(const NetworkPart<Config>& part) {
   int64_t parameters = 0;
   for (const auto& [name, tensor] : part.table.tensors) parameters += tensor.entry.num_elements();
   return formatted("  %-13s %zu tensors, %.1f M parameters, %s\n", name_of(part.table.network),
-                   part.table.tensors.size(), static_cast<double>(parameters) * 1e-6,
-                   name_of(part.table.naming));
+                   part.table.tensors.size(), static_cast<double>(parameters) * 1e-6, names_text(part.table));
 }
 
 std::string check_model_folder(const fs::path& folder) {

@@ -1,9 +1,27 @@
 #include "patina/diffusion/component.h"
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <ATen/ATen.h>
 
 namespace patina::diffusion {
 namespace {
+
+/// Gives back the memory of a tensor's whole pages in the map: they were read once, for a conversion, and
+/// would stand beside what they became until the whole file is loaded. Whoever reads them again gets them
+/// again.
+void release_pages(std::span<const uint8_t> bytes) {
+  const auto page = static_cast<uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const uintptr_t begin = (reinterpret_cast<uintptr_t>(bytes.data()) + page - 1) / page * page;
+  const uintptr_t end = (reinterpret_cast<uintptr_t>(bytes.data()) + bytes.size()) / page * page;
+  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
+}
+
+bool lies_in(const at::Tensor& tensor, std::span<const uint8_t> bytes) {
+  const auto* data = static_cast<const uint8_t*>(tensor.data_ptr());
+  return data >= bytes.data() && data < bytes.data() + bytes.size();
+}
 
 at::Tensor read_f32(const StoredTensor& tensor) {
   return nn::read_tensor(*tensor.file, tensor.entry, at::kFloat);
@@ -47,10 +65,13 @@ at::Tensor TableWeights::find(const std::string& name, at::IntArrayRef expected,
   // A vector that lies in the map would keep the map of a whole checkpoint alive after its matrices were
   // converted.
   if (tensor.dim() == 1) tensor = tensor.clone();
-  if (!changed) return tensor;
-  for (const LoraDelta& delta : deltas->second)
-    tensor = tensor + delta.scale * product(delta, tensor.sizes());
-  return tensor.to(type);
+  if (changed) {
+    for (const LoraDelta& delta : deltas->second)
+      tensor = tensor + delta.scale * product(delta, tensor.sizes());
+    tensor = tensor.to(type);
+  }
+  if (!lies_in(tensor, found->second.entry.bytes)) release_pages(found->second.entry.bytes);
+  return tensor;
 }
 
 std::vector<std::string> TableWeights::names() const {

@@ -29,6 +29,17 @@ bool is_pickle(const fs::path& path) {
   return kPickles.contains(path.extension().string());
 }
 
+/// False too where the folder may not be read.
+bool there(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+/// A whole diffusers model.
+bool is_model_folder(const fs::path& path) {
+  return there(path / "model_index.json") || there(path / "unet" / "config.json");
+}
+
 bool has_weights(const fs::path& folder) {
   try {
     weight_file(folder);
@@ -39,11 +50,10 @@ bool has_weights(const fs::path& folder) {
 }
 
 void search(FoundFiles& found, const fs::path& folder, int depth) {
-  if (fs::exists(folder / "merges.txt")) found.tokenizers.push_back(folder);
-  const bool is_model =
-      fs::exists(folder / "model_index.json") || fs::exists(folder / "unet" / "config.json");
+  if (there(folder / "merges.txt")) found.tokenizers.push_back(folder);
+  const bool is_model = is_model_folder(folder);
   if (is_model) found.models.push_back(folder);
-  const bool is_component = fs::exists(folder / "config.json") && has_weights(folder);
+  const bool is_component = there(folder / "config.json") && has_weights(folder);
   if (is_component) found.weights.push_back(folder);
 
   std::error_code ignored;
@@ -172,8 +182,7 @@ ModelEntry describe_entry(const fs::path& path) {
   ModelEntry entry;
   entry.path = path;
   try {
-    const bool is_model = fs::exists(path / "model_index.json") || fs::exists(path / "unet" / "config.json");
-    if (is_model)
+    if (is_model_folder(path))
       describe_model_folder(entry);
     else
       describe_weights(entry);
