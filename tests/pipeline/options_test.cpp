@@ -121,10 +121,10 @@ TEST(Options, a_preset_gives_way_to_what_is_given_beside_it) {
 }
 
 TEST(Options, what_is_not_given_comes_from_the_model) {
-  Config mini, tiny;
-  settle(mini);
-  EXPECT_EQ(mini.model.model.filename(), "patina-mini");
-  EXPECT_EQ(mini.orbit.resolution, 256);
+  Config none, tiny;
+  settle(none);
+  EXPECT_EQ(none.model.model, bundled_model());
+  EXPECT_EQ(none.orbit.resolution, bundled_model().empty() ? 512 : 256);
   tiny.model.model = test::data_dir() / "tiny-sd";
   settle(tiny);
   EXPECT_EQ(tiny.orbit.resolution, 128);

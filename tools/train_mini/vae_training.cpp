@@ -1,5 +1,7 @@
 #include "vae_training.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -22,7 +24,8 @@ namespace fs = std::filesystem;
 using diffusion::Vae;
 using diffusion::VaeConfig;
 
-constexpr double kKlWeight = 1e-4, kGradientWeight = 0.5;
+constexpr double kKlWeight = 1e-4, kGradientWeight = 0.5, kColourWeight = 1;
+constexpr int64_t kRecolouredOneIn = 3;    // crops
 constexpr int64_t kTile = 0, kTarget = 2;  // pictures of a sample
 constexpr double kCheckpointSeconds = 180;
 constexpr int64_t kHeldOutPictures = 24;
@@ -30,6 +33,14 @@ constexpr int64_t kHeldOutPictures = 24;
 /// Sample `index`'s picture in [-1,1], [3,256,256].
 at::Tensor picture(const SampleFolder& samples, int64_t index, int64_t which) {
   return samples.pictures(index)[which].to(at::kFloat) / 127.5 - 1;
+}
+
+/// The colour channels in another order: rusted and wooden things are all brown, and an autoencoder of
+/// nothing else has no green.
+at::Tensor recoloured(const at::Tensor& crop, std::mt19937_64& random) {
+  std::array<int64_t, 3> order{0, 1, 2};
+  std::shuffle(order.begin(), order.end(), random);
+  return at::stack({crop[order[0]], crop[order[1]], crop[order[2]]});
 }
 
 at::Tensor random_crops(const SampleFolder& samples, const VaeTraining& options, std::mt19937_64& random) {
@@ -43,6 +54,7 @@ at::Tensor random_crops(const SampleFolder& samples, const VaeTraining& options,
     at::Tensor crop =
         picture(samples, index, which).slice(1, y, y + options.side).slice(2, x, x + options.side);
     if (below(2)) crop = crop.flip({2});
+    if (below(kRecolouredOneIn) == 0) crop = recoloured(crop, random);
     crops.push_back(crop);
   }
   return at::stack(crops).to(options.device);
@@ -54,6 +66,15 @@ at::Tensor gradient_error(const at::Tensor& difference) {
   const at::Tensor dx = difference.slice(3, 1) - difference.slice(3, 0, -1),
                    dy = difference.slice(2, 1) - difference.slice(2, 0, -1);
   return dx.abs().mean() + dy.abs().mean();
+}
+
+/// Mean |difference| of the colours of blocks as large as a latent pixel. Hues are few in most pictures, so
+/// the plain difference is slow to teach them.
+at::Tensor colour_error(const at::Tensor& difference, int64_t block) {
+  const at::Tensor mean = at::avg_pool2d(difference, block);
+  const at::Tensor red_green = mean.select(1, 0) - mean.select(1, 1),
+                   blue_yellow = mean.select(1, 2) - 0.5 * (mean.select(1, 0) + mean.select(1, 1));
+  return red_green.abs().mean() + blue_yellow.abs().mean();
 }
 
 double psnr(double mean_square) {
@@ -113,7 +134,9 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
     const at::Tensor difference = vae.decode(latents) - x;
     const at::Tensor kl =
         0.5 * (posterior.mean.square() + at::exp(posterior.logvar) - 1 - posterior.logvar).mean();
-    const at::Tensor reconstruction = difference.abs().mean() + kGradientWeight * gradient_error(difference);
+    const at::Tensor colour = colour_error(difference, config.latent_scale());
+    const at::Tensor reconstruction =
+        difference.abs().mean() + kGradientWeight * gradient_error(difference) + kColourWeight * colour;
     const at::Tensor loss = options.decoder_only ? reconstruction : reconstruction + kKlWeight * kl;
     loss.backward();
     const double norm = parameters.gradient_norm();
@@ -124,6 +147,7 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
     if (std::isfinite(norm)) parameters.step(adam, run.step());
     run.log({{"loss", reconstruction.item<double>()},
              {"kl", kl.item<double>()},
+             {"colour", colour.item<double>()},
              {"psnr", psnr((difference.detach() / 2).square().mean().item<double>())},
              {"gradient", norm}});
     if (run.due(kCheckpointSeconds)) save();

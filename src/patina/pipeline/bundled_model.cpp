@@ -10,6 +10,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kName = "patina-mini";
+constexpr const char* kWeights = "unet/diffusion_pytorch_model.safetensors";
 constexpr int kUsualSampleSize = 64;  // latent pixels a side that Stable Diffusion 1.5 was trained at
 constexpr int kLatentScale = 8;       // image pixels a latent pixel
 
@@ -36,7 +37,7 @@ fs::path bundled_model() {
   const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
   for (const fs::path& folder : {program.parent_path() / ".." / "share" / "patina" / "models" / kName,
                                  fs::path(PATINA_SOURCE_DIR) / "models" / kName}) {
-    if (fs::is_directory(folder, ignored)) return folder.lexically_normal();
+    if (fs::exists(folder / kWeights, ignored)) return folder.lexically_normal();
   }
   return {};
 }

@@ -33,7 +33,7 @@ void check_inputs(const Config& config) {
   if (config.model.model.empty())
     throw Error(
         ErrorCode::kUsage, "--model",
-        "patina-mini, the model that comes with patina, was not found; give a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
+        "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
         "2.x; `patina models DIR` lists those in a folder");
   diffusion::check_model(config.model);
   if (config.output.empty()) return;

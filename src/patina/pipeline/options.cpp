@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "patina/pipeline/bundled_model.h"
 #include "patina/pipeline/option_kinds.h"
 
 namespace patina::pipeline {
@@ -336,7 +337,7 @@ std::vector<Option> make_options() {
        .help =
            "Diffusion model (Stable Diffusion 1.x or 2.x): a diffusers folder, a .safetensors checkpoint, or "
            "the name of one in the model folders.",
-       .default_text = "patina-mini, which comes with patina",
+       .default_text = bundled_model().empty() ? "" : "patina-mini, which comes with patina",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.model.model; }));
   add(text_option(
