@@ -39,7 +39,8 @@ void add_stage_on_run(CLI::App& program, const std::string& name, const std::str
   command->add_option("RUN", *folder, "The run folder, as `patina render` or `patina enhance` made it.")
       ->required()
       ->type_name("");
-  const auto given = add_options(*command, stages, {"run"});
+  // A preset would change the number of views, which the folder's renders have settled.
+  const auto given = add_options(*command, stages, {"run", "preset"});
   command->callback([=] { run_stage(pipeline::read_config(*folder), *given, stage, made); });
 }
 

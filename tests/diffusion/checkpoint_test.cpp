@@ -6,6 +6,7 @@
 #include "patina/base/files.h"
 #include "patina/diffusion/check_model.h"
 #include "patina/diffusion/weight_files.h"
+#include "refusals.h"
 #include "small_runs.h"
 
 namespace patina::diffusion {
@@ -30,19 +31,6 @@ std::vector<Image> run(const ModelPaths& paths, Dtype dtype = Dtype::kF32) {
   options.num_steps = 2, options.strength = 1;
   options.negative_prompt = "clean";
   return generate_detail(model, test::made_inputs(1, 64), options, {}, {});
-}
-
-std::string failure(const auto& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
-void expect_in(const std::string& part, const std::string& text) {
-  EXPECT_NE(text.find(part), std::string::npos) << "expected: " << part << "\n   found: " << text;
 }
 
 class Checkpoint : public testing::TestWithParam<Family> {

@@ -10,6 +10,7 @@
 #include "patina/diffusion/model_folders.h"
 #include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/tokenizer.h"
+#include "refusals.h"
 
 namespace patina::diffusion {
 namespace {
@@ -18,18 +19,6 @@ namespace fs = std::filesystem;
 namespace make = make_checkpoint;
 
 const fs::path kTokenizer = test::data_dir() / "tiny-sd" / "tokenizer";
-
-std::string failure(const auto& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-void expect_in(const std::string& part, const std::string& text) {
-  EXPECT_NE(text.find(part), std::string::npos) << "expected: " << part << "\n   found: " << text;
-}
 
 /// A tree like ComfyUI's, of shapes alone.
 class Tree : public testing::Test {

@@ -1,12 +1,12 @@
 // make_dataset: makes the data that patina-mini is trained on. See docs/dataset.md.
 #include <charconv>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <vector>
 
 #include "materials.h"
+#include "mini_data/console.h"
 #include "objects.h"
 #include "pack.h"
 #include "preview.h"
@@ -74,23 +74,6 @@ Arguments parsed(int argc, char** argv) {
   return out;
 }
 
-// One line that says how far a job is and how long the rest may take.
-Progress console() {
-  Progress progress;
-  const auto start = std::chrono::steady_clock::now();
-  progress.on_update = [start](std::string_view task, double done, double total) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const double left = done > 0 ? seconds * (total - done) / done : 0;
-    std::fprintf(stderr, "\r%.*s %.0f of %.0f, %.0f s gone, about %.0f s left   %s",
-                 static_cast<int>(task.size()), task.data(), done, total, seconds, left,
-                 done >= total ? "\n" : "");
-  };
-  progress.on_warning = [](std::string_view text) {
-    std::fprintf(stderr, "\nwarning: %.*s\n", static_cast<int>(text.size()), text.data());
-  };
-  return progress;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -100,9 +83,10 @@ int main(int argc, char** argv) {
     const Arguments a = parsed(argc, argv);
     const auto has = [&](size_t n) { return a.good && a.positional.size() == n; };
     if (command == "objects" && has(1)) {
-      bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects", console());
+      bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects",
+                   mini_data::console_progress());
     } else if (command == "materials" && has(1) && !a.shared.empty()) {
-      const auto entries = material_entries(a.shared / "materials", a.limit, console());
+      const auto entries = material_entries(a.shared / "materials", a.limit, mini_data::console_progress());
       mini_data::write_shard(fs::path(a.positional[0]) / "materials.shard", entries);
     } else if (command == "pack" && has(2)) {
       std::fputs(pack(a.positional[0], a.positional[1]).c_str(), stdout);

@@ -59,7 +59,6 @@ DenoiserData::DenoiserData(const std::filesystem::path& folder, const std::files
   }
   for (int64_t i = 0; i < samples_.size(); ++i) {
     const Sample& sample = samples_.samples()[static_cast<size_t>(i)];
-    singles_.push_back(i);
     if (sample.group_views == kGroupViews && sample.view == 0 && i + kGroupViews <= samples_.size())
       groups_.push_back(i);
   }
@@ -73,7 +72,7 @@ DenoiserBatch DenoiserData::draw(Cut cut, int64_t count, std::mt19937_64& random
   for (int64_t i = 0; i < count; ++i) {
     const bool grid = cut == Cut::kGrid;
     const int64_t first = grid ? groups_[static_cast<size_t>(below(static_cast<int64_t>(groups_.size())))]
-                               : singles_[static_cast<size_t>(below(samples_.size()))];
+                               : below(samples_.size());
     const bool mirrored = vary && below(2);
     const int64_t side = cut == Cut::kCrop ? latent_side_ / 2 : latent_side_;
     const int64_t y = cut == Cut::kCrop ? below(latent_side_ - side + 1) : 0,

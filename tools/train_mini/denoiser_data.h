@@ -38,7 +38,7 @@ class DenoiserData {
   diffusion::Tokenizer tokenizer_;
   int64_t channels_ = 0, latent_side_ = 0;
   double scaling_factor_ = 1;
-  std::vector<int64_t> singles_, groups_;  // indices of all samples, and of the first of each group of four
+  std::vector<int64_t> groups_;  // the first sample of each group of four views
 };
 
 }  // namespace patina::train_mini

@@ -29,8 +29,8 @@ constexpr double kSnrLimit = 5;  // γ of min-SNR weighting [Hang2023]
 // Share of samples without the one or the other condition. The render says so much that words are hardly
 // listened to beside it: without it they must be.
 constexpr double kTileDropout = 0.35, kNormalDropout = 0.12;
-constexpr double kNoisyShare =
-    0.5;  // of the samples have a time of the noisier part, where words decide most
+// Share of samples whose time is drawn from the noisier part alone, where words decide most.
+constexpr double kNoisyShare = 0.5;
 constexpr double kCheckpointSeconds = 240;
 constexpr double kAverage = 0.998;  // of a training of ten thousand steps
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "denoiser_training.h"
+#include "mini_data/console.h"
 #include "mini_data/plan.h"
 #include "patina/base/error.h"
 #include "samples.h"
@@ -77,15 +78,6 @@ Arguments parsed(int argc, char** argv) {
   return out;
 }
 
-Progress console() {
-  Progress progress;
-  progress.on_update = [](std::string_view task, double done, double total) {
-    std::printf("\r%.*s %.0f / %.0f ", static_cast<int>(task.size()), task.data(), done, total);
-    std::fflush(stdout);
-  };
-  return progress;
-}
-
 void print_captions(const fs::path& shards, int64_t count) {
   const mini_data::Dataset dataset = mini_data::read_dataset(shards, mini_data::Part::kTraining);
   const mini_data::Catalog catalog = mini_data::catalog_of(dataset);
@@ -102,10 +94,10 @@ int run(const std::string& command, Arguments arguments) {
     SampleOptions options;
     options.device = device;
     options.count = arguments.count;
-    make_samples(names[0], fs::path(names[1]) / "training", options, console());
+    make_samples(names[0], fs::path(names[1]) / "training", options, mini_data::console_progress());
     options.part = mini_data::Part::kHeldOut;
     options.count = arguments.count / 20;
-    make_samples(names[0], fs::path(names[1]) / "held_out", options, console());
+    make_samples(names[0], fs::path(names[1]) / "held_out", options, mini_data::console_progress());
   } else if (command == "captions" && names.size() == 1) {
     print_captions(names[0], arguments.count);
   } else if (command == "vae" && names.size() == 2) {

@@ -117,4 +117,16 @@ inline Option degrees_option(Option option, float low, float high, float& (*memb
   return option;
 }
 
+template <class Member>
+Option paths_option(Option option, Member member) {
+  option.is_list = true;
+  option.set = [member](Config& c, Values v) { member(c).assign(v.begin(), v.end()); };
+  option.get = [member](const Config& c) {
+    json list = json::array();
+    for (const std::filesystem::path& path : member(const_cast<Config&>(c))) list.push_back(path.string());
+    return list;
+  };
+  return option;
+}
+
 }  // namespace patina::pipeline::option_kinds
