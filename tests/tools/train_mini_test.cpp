@@ -3,16 +3,24 @@
 #include <fstream>
 
 #include <ATen/ATen.h>
+#include <c10/core/InferenceMode.h>
 #include <gtest/gtest.h>
 
+#include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/diffusion/detail.h"
+#include "patina/diffusion/detail_run.h"
 #include "patina/diffusion/unet.h"
 #include "patina/diffusion/vae.h"
 #include "patina/nn/attend.h"
 #include "support.h"
+#include "train_mini/colour_path.h"
+#include "train_mini/denoiser_training.h"
 #include "train_mini/parameters.h"
 #include "train_mini/samples.h"
 #include "train_mini/vae_training.h"
+#include "train_mini/words_training.h"
+#include "train_mini/workers.h"
 
 namespace patina::train_mini {
 namespace {
@@ -122,8 +130,7 @@ void write_samples(const fs::path& folder, int count) {
     const at::Tensor wave = (at::sin(at::arange(256) * (0.02 * (i + 1))) * 100 + 128).to(at::kByte);
     const at::Tensor record = wave.expand({9, 256, 256}).contiguous();
     pictures.write(static_cast<const char*>(record.data_ptr()), record.numel());
-    lines << R"({"caption": "a band", "class": "band", "views": 1, "view": 0})"
-          << "\n";
+    lines << R"({"caption": "a band", "class": "band", "views": 4, "view": )" << i % 4 << "}\n";
   }
 }
 
@@ -135,6 +142,99 @@ TEST(SampleFolder, gives_pictures_and_captions_and_ignores_a_record_that_was_cut
   ASSERT_EQ(samples.size(), 2);
   EXPECT_EQ(samples.samples()[1].caption, "a band");
   EXPECT_EQ(samples.pictures(0)[0][0][0][0].item<int>(), 128);
+}
+
+TEST(Workers, share_a_batch_and_add_their_gradients_in_the_same_leaves) {
+  const at::Tensor x = at::randn({7, 5}), leaf = at::randn({5}).set_requires_grad(true);
+  const auto gradient = [&](int64_t workers) {
+    leaf.mutable_grad() = at::Tensor();
+    in_shares(workers, 7, [&](int64_t begin, int64_t end) {
+      at::tanh(at::matmul(x.slice(0, begin, end), leaf)).sum().backward();
+    });
+    return leaf.grad().clone();
+  };
+  const at::Tensor alone = gradient(1);
+  for (const int64_t workers : {2, 3, 7, 12})
+    EXPECT_LT((gradient(workers) - alone).abs().max().item<float>(), 1e-6f) << workers;
+  EXPECT_TRUE(gradient(2).equal(gradient(2)));
+}
+
+TEST(Workers, throw_what_a_share_threw) {
+  const auto fails_at_the_end = [](int64_t, int64_t end) {
+    if (end == 4) throw Error(ErrorCode::kIo, "a share", "failed");
+  };
+  EXPECT_THROW(in_shares(2, 4, fails_at_the_end), Error);
+}
+
+/// Folder of a model of patina-mini's sizes without weights, but for the VAE, which is smaller.
+fs::path small_model(const fs::path& folder) {
+  fs::copy("models/patina-mini", folder, fs::copy_options::recursive);
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+    if (entry.path().extension() == ".safetensors") fs::remove(entry.path());
+  write_file(
+      folder / "vae" / "config.json",
+      R"({"block_out_channels": [8, 8, 8, 8], "layers_per_block": 1, "norm_num_groups": 2, "latent_channels": 8,
+                 "mid_block_add_attention": false, "use_quant_conv": false, "use_post_quant_conv": false})");
+  return folder;
+}
+
+TEST(ColourPath, an_untrained_autoencoder_tells_colours_apart) {
+  const test::TemporaryFolder folder;
+  const diffusion::VaeConfig config =
+      diffusion::read_vae_config(small_model(folder.path() / "model") / "vae");
+  Parameters parameters("vae", 3, c10::kCPU);
+  const auto vae = [&] {
+    nn::WeightReader weights(parameters, at::kFloat);
+    return diffusion::Vae(config, weights);
+  };
+  vae();
+  lay_colour_path(parameters);
+  // Quarters of red, green, blue and grey.
+  at::Tensor picture = at::zeros({1, 3, 64, 64});
+  for (int64_t i = 0; i < 3; ++i)
+    picture[0][i].slice(0, 32 * (i / 2), 32 * (i / 2) + 32).slice(1, 32 * (i % 2), 32 * (i % 2) + 32) += 0.6;
+  const c10::InferenceMode inference;
+  const at::Tensor decoded = vae().decode(vae().encode(picture).mean);
+  for (int64_t i = 0; i < 3; ++i) {
+    const at::Tensor quarter = decoded[0]
+                                   .slice(1, 32 * (i / 2) + 8, 32 * (i / 2) + 24)
+                                   .slice(2, 32 * (i % 2) + 8, 32 * (i % 2) + 24)
+                                   .mean({1, 2});
+    EXPECT_EQ(quarter.argmax().item<int64_t>(), i) << quarter;
+    EXPECT_GT((quarter[i] - quarter[(i + 1) % 3]).item<float>(), 0.1f);
+  }
+}
+
+TEST(Training, goes_from_pictures_to_a_model_that_edits) {
+  const test::TemporaryFolder folder;
+  const fs::path work = folder.path() / "work", model = small_model(folder.path() / "model");
+  write_samples(work / "training", 4);
+  write_samples(work / "held_out", 8);
+  RunOptions run;
+  run.minutes = 1.0 / 60;
+  train_vae(work, model, {.run = run, .batch = 2, .side = 32});
+  train_words(work, model, run);
+  encode_latents(work, model, c10::kCPU);
+  run.workers = 2;
+  train_denoiser(work, model, {.run = run, .crops = 2, .views = 2, .grids = 1});
+  const auto steps = [&] { return std::stoll(read_text_file(work / "denoiser.step")); };
+  const auto first = steps();
+  EXPECT_GT(first, 0);
+  train_denoiser(work, model, {.run = run, .crops = 2, .views = 2, .grids = 1});
+  EXPECT_GT(steps(), first);
+
+  diffusion::ModelPaths paths;
+  paths.model = model;
+  const diffusion::Model trained(paths, {});
+  diffusion::DetailInputs inputs;
+  inputs.tile_views = inputs.normal_views = {Image(64, 64, 3)};
+  inputs.noise = diffusion::scheduler_noise(7, 0, 8 * 8 * 8);
+  diffusion::DetailOptions options;
+  options.prompt = "a band";
+  options.num_steps = 2;
+  const Image edited = generate_detail(trained, inputs, options, {}, {})[0];
+  EXPECT_EQ(edited.width, 64);
+  for (const float value : edited.pixels) ASSERT_TRUE(std::isfinite(value));
 }
 
 TEST(VaeTraining, learns_goes_on_and_leaves_a_vae_that_loads) {

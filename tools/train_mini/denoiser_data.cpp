@@ -2,6 +2,7 @@
 
 #include <ATen/ATen.h>
 
+#include "captions.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/config.h"
 
@@ -12,35 +13,6 @@ using mini_data::kViewSide;
 
 constexpr int64_t kTile = 0, kNormal = 1;  // pictures of a sample
 constexpr int64_t kGroupViews = 4;
-
-/// Words that say nothing about the material must not matter, so some captions get such words, and letters
-/// that are no word at all.
-std::string with_noise_words(std::string caption, std::mt19937_64& random) {
-  static const std::vector<std::string> words{
-      "beautiful",    "masterpiece",   "8k",         "4k",       "best quality", "cinematic",
-      "sharp focus",  "unreal engine", "octane",     "high",     "resolution",   "intricate",
-      "professional", "the",           "my",         "of",       "in",           "scene",
-      "game",         "prop",          "artstation", "trending", "hdr",          "product",
-      "photography",  "ultra",         "style",      "really",   "nice",         "big",
-      "small",        "soft",          "light",      "raw",      "dslr"};
-  if (random() % 100 >= 18) return caption;
-  const auto count = 1 + random() % 3;
-  for (uint64_t i = 0; i < count; ++i) {
-    std::string word = words[random() % words.size()];
-    if (random() % 3 == 0) {
-      word.clear();
-      const auto letters = 2 + random() % 8;
-      for (uint64_t k = 0; k < letters; ++k) word += static_cast<char>('a' + random() % 26);
-    }
-    // At the front, at the end, or at a space.
-    std::vector<size_t> places{0, caption.size()};
-    for (size_t k = 0; k < caption.size(); ++k)
-      if (caption[k] == ' ') places.push_back(k);
-    const size_t place = places[random() % places.size()];
-    caption.insert(place, place == caption.size() ? ", " + word : place == 0 ? word + " " : " " + word);
-  }
-  return caption;
-}
 
 }  // namespace
 
@@ -112,7 +84,7 @@ DenoiserBatch DenoiserData::draw(Cut cut, int64_t count, std::mt19937_64& random
     tiles.push_back(tiled(view_tiles));
     normals.push_back(tiled(view_normals));
     const std::string& caption = samples_.samples()[static_cast<size_t>(first)].caption;
-    const std::string said = vary && !caption.empty() ? with_noise_words(caption, random) : caption;
+    const std::string said = vary ? with_noise_words(caption, random) : caption;
     const std::vector<int64_t> tokens = tokenizer_.encode_padded(said, tokenizer_.max_length());
     ids.insert(ids.end(), tokens.begin(), tokens.end());
   }

@@ -29,6 +29,8 @@ class DenoiserData {
   /// `folder` is WORK/training or WORK/held_out. Throws Error.
   DenoiserData(const std::filesystem::path& folder, const std::filesystem::path& model);
 
+  int64_t size() const { return samples_.size(); }  // views
+
   /// `vary` false: captions as they are and no mirroring, for measuring.
   DenoiserBatch draw(Cut cut, int64_t count, std::mt19937_64& random, bool vary) const;
 

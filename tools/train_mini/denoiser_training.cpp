@@ -1,9 +1,11 @@
 #include "denoiser_training.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <mutex>
 #include <random>
 #include <string>
 #include <vector>
@@ -18,6 +20,7 @@
 #include "patina/diffusion/schedulers.h"
 #include "patina/diffusion/text_encoder.h"
 #include "patina/diffusion/unet.h"
+#include "workers.h"
 
 namespace patina::train_mini {
 namespace {
@@ -32,6 +35,7 @@ constexpr double kTileDropout = 0.35, kNormalDropout = 0.12;
 // Share of samples whose time is drawn from the noisier part alone, where words decide most.
 constexpr double kNoisyShare = 0.5;
 constexpr double kCheckpointSeconds = 240;
+constexpr int64_t kViewsMeasured = 24;
 constexpr double kAverage = 0.998;  // of a training of ten thousand steps
 
 constexpr std::array<const char*, 4> kComponents{"text_encoder", "unet", "controlnet_tile",
@@ -66,10 +70,9 @@ ControlResiduals scaled(ControlResiduals residuals, const at::Tensor& scale) {
 }
 
 /// Mean square error of the predicted velocity [Salimans2022], one a sample, [B].
-at::Tensor velocity_error(const Networks& networks, const DenoiserBatch& batch, const at::Tensor& timesteps,
-                          const at::Tensor& alphas_cumprod, const at::Tensor& tile_scale,
-                          const at::Tensor& normal_scale) {
-  const at::Tensor noise = at::randn_like(batch.latents);
+at::Tensor velocity_error(const Networks& networks, const DenoiserBatch& batch, const at::Tensor& noise,
+                          const at::Tensor& timesteps, const at::Tensor& alphas_cumprod,
+                          const at::Tensor& tile_scale, const at::Tensor& normal_scale) {
   const at::Tensor alpha_bar = alphas_cumprod.index_select(0, timesteps).view({-1, 1, 1, 1});
   const at::Tensor signal = alpha_bar.sqrt(), spread = (1 - alpha_bar).sqrt();
   const at::Tensor noisy = signal * batch.latents + spread * noise;
@@ -86,26 +89,41 @@ at::Tensor velocity_error(const Networks& networks, const DenoiserBatch& batch, 
   return (predicted - velocity).square().mean({1, 2, 3});
 }
 
+DenoiserBatch part_of(const DenoiserBatch& batch, int64_t begin, int64_t end) {
+  return {batch.latents.slice(0, begin, end), batch.tile.slice(0, begin, end),
+          batch.normal.slice(0, begin, end), batch.ids.slice(0, begin, end)};
+}
+
 DenoiserBatch on_device(DenoiserBatch batch, c10::Device device) {
   for (at::Tensor* tensor : {&batch.latents, &batch.tile, &batch.normal, &batch.ids})
     *tensor = tensor->to(device);
   return batch;
 }
 
-/// Mean error over held-out views at fixed times, all conditions on.
-std::vector<double> held_out_errors(const Networks& networks, const DenoiserData& data,
-                                    const at::Tensor& alphas_cumprod, const std::vector<int64_t>& times,
-                                    c10::Device device) {
-  std::vector<double> errors;
-  for (const int64_t time : times) {
-    std::mt19937_64 random(7);
-    at::manual_seed(7);
-    const DenoiserBatch batch = on_device(data.draw(Cut::kView, 16, random, /*vary=*/false), device);
-    const at::Tensor ones = at::ones({16}, at::device(device));
-    const at::Tensor timesteps = at::full({16}, time, at::device(device).dtype(at::kLong));
-    errors.push_back(
-        velocity_error(networks, batch, timesteps, alphas_cumprod, ones, ones).mean().item<double>());
-  }
+struct ViewErrors {
+  double asked = 0;   // with its own words
+  double others = 0;  // with the words of another sample: larger where words are listened to
+};
+
+/// Mean errors over views at one time, all conditions on.
+ViewErrors view_errors(const Networks& networks, const DenoiserData& data, const at::Tensor& alphas_cumprod,
+                       int64_t time, c10::Device device) {
+  const int64_t num_views = std::min(kViewsMeasured, data.size());
+  std::mt19937_64 random(7);
+  at::manual_seed(7);
+  DenoiserBatch batch = on_device(data.draw(Cut::kView, num_views, random, /*vary=*/false), device);
+  const at::Tensor ones = at::ones({num_views}, at::device(device));
+  const at::Tensor timesteps = at::full({num_views}, time, at::device(device).dtype(at::kLong));
+  const at::Tensor noise = at::randn_like(batch.latents);
+  const auto error = [&] {
+    return velocity_error(networks, batch, noise, timesteps, alphas_cumprod, ones, ones)
+        .mean()
+        .item<double>();
+  };
+  ViewErrors errors;
+  errors.asked = error();
+  batch.ids = batch.ids.roll(1, 0);
+  errors.others = error();
   return errors;
 }
 
@@ -145,15 +163,15 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     }
     write_file(step_file, std::to_string(run.step()));
     const c10::InferenceMode inference;
-    const std::vector<int64_t> times{50, 200, 400, 600, 800, 950};
-    const std::vector<double> errors = held_out_errors(networks_of(stores, configs, at::kFloat), held_out,
-                                                       alphas_cumprod, times, options.device);
-    const std::vector<double> seen = held_out_errors(networks_of(stores, configs, at::kFloat), training,
-                                                     alphas_cumprod, times, options.device);
+    const Networks averaged = networks_of(stores, configs, at::kBFloat16);
+    std::printf("velocity error held out (with others' words, on training views):");
+    for (const int64_t time : {50, 200, 400, 600, 800, 950}) {
+      const ViewErrors unseen = view_errors(averaged, held_out, alphas_cumprod, time, options.device);
+      const ViewErrors seen = view_errors(averaged, training, alphas_cumprod, time, options.device);
+      std::printf(" t=%lld %.4f (%.4f, %.4f)", static_cast<long long>(time), unseen.asked, unseen.others,
+                  seen.asked);
+    }
     for (const auto& store : stores) store->use_average(false);
-    std::printf("held out (training):");
-    for (size_t i = 0; i < times.size(); ++i)
-      std::printf(" t=%lld %.4f (%.4f)", static_cast<long long>(times[i]), errors[i], seen[i]);
     std::printf("\n");
     std::fflush(stdout);
   };
@@ -177,14 +195,24 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     const at::Tensor tile_scale = (at::rand({count}, device) >= kTileDropout).to(at::kFloat);
     const at::Tensor normal_scale = (at::rand({count}, device) >= kNormalDropout).to(at::kFloat);
 
+    const at::Tensor noise = at::randn_like(batch.latents);
     const Networks networks = networks_of(stores, configs, at::kBFloat16);
-    const at::Tensor errors =
-        velocity_error(networks, batch, timesteps, alphas_cumprod, tile_scale, normal_scale);
-    const at::Tensor alpha_bar = alphas_cumprod.index_select(0, timesteps);
-    const at::Tensor snr = alpha_bar / (1 - alpha_bar);
-    const at::Tensor loss =
-        (errors * at::clamp_max(snr, kSnrLimit) / (snr + 1)).mean() + (errors / (snr + 1)).mean();
-    loss.backward();
+    std::mutex mutex;
+    double mean_error = 0, mean_loss = 0;
+    in_shares(options.run.workers, count, [&](int64_t begin, int64_t end) {
+      const auto part = [&](const at::Tensor& whole) { return whole.slice(0, begin, end); };
+      const at::Tensor errors =
+          velocity_error(networks, part_of(batch, begin, end), part(noise), part(timesteps), alphas_cumprod,
+                         part(tile_scale), part(normal_scale));
+      const at::Tensor alpha_bar = alphas_cumprod.index_select(0, part(timesteps));
+      const at::Tensor snr = alpha_bar / (1 - alpha_bar);
+      const at::Tensor loss =
+          (errors * (at::clamp_max(snr, kSnrLimit) + 1) / (snr + 1)).sum() / static_cast<double>(count);
+      loss.backward();
+      const std::lock_guard lock(mutex);
+      mean_error += errors.detach().sum().item<double>() / static_cast<double>(count);
+      mean_loss += loss.item<double>();
+    });
 
     double squares = 0;
     for (const auto& store : stores) squares += std::pow(store->gradient_norm(), 2);
@@ -199,8 +227,7 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
       }
     }
     const char* kind = cut == Cut::kCrop ? "crop" : cut == Cut::kView ? "view" : "grid";
-    run.log(
-        {{kind, errors.detach().mean().item<double>()}, {"loss", loss.item<double>()}, {"gradient", norm}});
+    run.log({{kind, mean_error}, {"loss", mean_loss}, {"gradient", norm}});
     if (run.due(kCheckpointSeconds)) save();
   }
   save();

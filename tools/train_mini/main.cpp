@@ -12,6 +12,8 @@
 #include "samples.h"
 #include "sheet.h"
 #include "vae_training.h"
+#include "words_training.h"
+#include "workers.h"
 
 namespace {
 
@@ -89,6 +91,7 @@ int run(const std::string& command, Arguments arguments) {
   const std::vector<std::string>& names = arguments.positional;
   const c10::Device device = arguments.cuda ? c10::kCUDA : c10::kCPU;
   stop_on_signals();
+  arguments.run.workers = default_workers(device);
   if (arguments.rate > 0) arguments.run.rate = arguments.rate;
   if (command == "samples" && names.size() == 2) {
     SampleOptions options;
@@ -107,6 +110,8 @@ int run(const std::string& command, Arguments arguments) {
     options.device = device;
     if (arguments.batch > 0) options.batch = arguments.batch;
     train_vae(names[0], names[1], options);
+  } else if (command == "words" && names.size() == 2) {
+    train_words(names[0], names[1], arguments.run);
   } else if (command == "latents" && names.size() == 2) {
     encode_latents(names[0], names[1], device);
   } else if (command == "denoiser" && names.size() == 2) {

@@ -14,6 +14,8 @@ namespace {
 
 /// Of layers that a network starts without: residual branches add nothing at first.
 constexpr double kResidualScale = 0.1;
+/// Of the attention to the words, which must not begin in a whisper.
+constexpr double kWordsScale = 0.5;
 /// Steps between two updates of the moving average.
 constexpr int64_t kAverageInterval = 4;
 
@@ -32,7 +34,8 @@ at::Tensor initial(const std::string& name, at::IntArrayRef shape, uint64_t seed
   double scale = 1 / std::sqrt(static_cast<double>(fan_in));
   for (const char* last : {".conv2.weight", ".proj_out.weight", ".to_out.0.weight", ".net.2.weight",
                            ".out_proj.weight", ".fc2.weight", "conv_out.weight"}) {
-    if (ends_with(name, last)) scale *= kResidualScale;
+    if (ends_with(name, last))
+      scale *= name.find(".attn2.") != std::string::npos ? kWordsScale : kResidualScale;
   }
   if (name.find("controlnet_down_blocks") == 0 || name.find("controlnet_mid_block") == 0)
     scale *= kResidualScale;
@@ -102,6 +105,17 @@ std::vector<std::string> Parameters::names() const {
   std::vector<std::string> names;
   for (const Entry& entry : entries_) names.push_back(entry.name);
   return names;
+}
+
+at::Tensor Parameters::start_of(const std::string& name) const {
+  return entries_[index_.at(name)].value.detach();
+}
+
+void Parameters::start_with(const std::string& name, const at::Tensor& value) {
+  const c10::NoGradGuard no_gradients;
+  Entry& entry = entries_[index_.at(name)];
+  entry.value.copy_(value);
+  entry.average.copy_(value);
 }
 
 void Parameters::step(const Adam& adam, int64_t step) {

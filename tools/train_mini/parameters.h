@@ -31,6 +31,10 @@ class Parameters final : public nn::WeightSource {
   /// While true, find() gives the moving average, without gradients.
   void use_average(bool on) { use_average_ = on; }
 
+  /// A value before the first step, and another in its place.
+  at::Tensor start_of(const std::string& name) const;
+  void start_with(const std::string& name, const at::Tensor& value);
+
   struct Adam {
     double rate = 3e-4, beta1 = 0.9, beta2 = 0.99, epsilon = 1e-8, weight_decay = 0.01;
     double average = 0.999;  // share of the moving average that is kept a step

@@ -14,6 +14,7 @@ struct RunOptions {
   double rate = 3e-4;
   bool settle = false;  // the rate falls to zero over the run
   uint64_t seed = 0;
+  int64_t workers = 1;  // threads that share a step
 };
 
 /// Counts the steps of one run. `log` gets a line of JSON now and then, which is also printed.

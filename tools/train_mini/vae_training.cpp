@@ -5,17 +5,21 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <map>
+#include <mutex>
 #include <random>
 
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 #include <nlohmann/json.hpp>
 
+#include "colour_path.h"
 #include "parameters.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/vae.h"
 #include "samples.h"
+#include "workers.h"
 
 namespace patina::train_mini {
 namespace {
@@ -107,6 +111,7 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
   parameters.read(checkpoint);
   Run run(options.run, work / "vae.log", fs::exists(step_file) ? std::stoll(read_text_file(step_file)) : 0);
   vae_of(parameters, config, at::kFloat);
+  if (run.step() == 0) lay_colour_path(parameters);
   std::printf("VAE: %.2f M parameters, %lld training pictures\n",
               static_cast<double>(parameters.num_parameters()) * 1e-6,
               static_cast<long long>(training.size()));
@@ -127,28 +132,41 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
     std::mt19937_64 random(options.run.seed + static_cast<uint64_t>(run.step()) * 0x9E3779B97F4A7C15u);
     at::manual_seed(random());
     const at::Tensor x = random_crops(training, options, random);
+    const int64_t scale = config.latent_scale();
+    const at::Tensor noise =
+        at::randn({x.size(0), config.latent_channels, x.size(2) / scale, x.size(3) / scale}, x.options());
     const Vae vae = vae_of(parameters, config, at::kBFloat16);
-    const diffusion::Posterior posterior = vae.encode(x);
-    at::Tensor latents = posterior.mean + at::exp(0.5 * posterior.logvar) * at::randn_like(posterior.mean);
-    if (options.decoder_only) latents = latents.detach();
-    const at::Tensor difference = vae.decode(latents) - x;
-    const at::Tensor kl =
-        0.5 * (posterior.mean.square() + at::exp(posterior.logvar) - 1 - posterior.logvar).mean();
-    const at::Tensor colour = colour_error(difference, config.latent_scale());
-    const at::Tensor reconstruction =
-        difference.abs().mean() + kGradientWeight * gradient_error(difference) + kColourWeight * colour;
-    const at::Tensor loss = options.decoder_only ? reconstruction : reconstruction + kKlWeight * kl;
-    loss.backward();
+    std::mutex mutex;
+    std::map<std::string, double> means;
+    in_shares(options.run.workers, x.size(0), [&](int64_t begin, int64_t end) {
+      const at::Tensor pictures = x.slice(0, begin, end);
+      const diffusion::Posterior posterior = vae.encode(pictures);
+      at::Tensor latents = posterior.mean + at::exp(0.5 * posterior.logvar) * noise.slice(0, begin, end);
+      if (options.decoder_only) latents = latents.detach();
+      const at::Tensor difference = vae.decode(latents) - pictures;
+      const at::Tensor kl =
+          0.5 * (posterior.mean.square() + at::exp(posterior.logvar) - 1 - posterior.logvar).mean();
+      const at::Tensor colour = colour_error(difference, scale);
+      const at::Tensor reconstruction =
+          difference.abs().mean() + kGradientWeight * gradient_error(difference) + kColourWeight * colour;
+      const double share = static_cast<double>(end - begin) / static_cast<double>(x.size(0));
+      ((options.decoder_only ? reconstruction : reconstruction + kKlWeight * kl) * share).backward();
+      const std::lock_guard lock(mutex);
+      means["loss"] += share * reconstruction.item<double>();
+      means["kl"] += share * kl.item<double>();
+      means["colour"] += share * colour.item<double>();
+      means["square"] += share * (difference.detach() / 2).square().mean().item<double>();
+    });
     const double norm = parameters.gradient_norm();
     if (norm > 1) parameters.scale_gradients(1 / norm);
     Parameters::Adam adam;
     adam.rate = run.rate();
     adam.weight_decay = 0;
     if (std::isfinite(norm)) parameters.step(adam, run.step());
-    run.log({{"loss", reconstruction.item<double>()},
-             {"kl", kl.item<double>()},
-             {"colour", colour.item<double>()},
-             {"psnr", psnr((difference.detach() / 2).square().mean().item<double>())},
+    run.log({{"loss", means["loss"]},
+             {"kl", means["kl"]},
+             {"colour", means["colour"]},
+             {"psnr", psnr(means["square"])},
              {"gradient", norm}});
     if (run.due(kCheckpointSeconds)) save();
   }

@@ -1,6 +1,7 @@
 #include "patina/nn/layers.h"
 
 #include <ATen/ATen.h>
+#include <torch/version.h>
 
 namespace patina::nn {
 
@@ -12,9 +13,27 @@ at::Tensor Conv2d::operator()(const at::Tensor& x, const Recorder& record) const
   return record(name, at::conv2d(x, weight, bias, stride, padding));
 }
 
+namespace {
+
+/// Whether group_norm takes bf16 pixels with f32 gains, and takes them faster than after a conversion: on
+/// processors, LibTorch 2.x, large images (8 × 16 × 128²: 12.5 against 26 ms forward and back; 8 × 64 × 16²:
+/// 1.2 against 0.4 ms).
+bool takes_mixed_types(const at::Tensor& x) {
+#if TORCH_VERSION_MAJOR >= 2
+  constexpr int64_t kLargePixels = 1024;
+  return x.is_cpu() && x.scalar_type() == at::kBFloat16 && x.size(2) * x.size(3) >= kLargePixels;
+#else
+  (void)x;
+  return false;
+#endif
+}
+
+}  // namespace
+
 at::Tensor GroupNorm::operator()(const at::Tensor& x, const Recorder& record) const {
-  return record(name,
-                at::group_norm(x.to(at::kFloat), num_groups, weight, bias, epsilon).to(x.scalar_type()));
+  const bool as_is = takes_mixed_types(x);
+  const at::Tensor y = at::group_norm(as_is ? x : x.to(at::kFloat), num_groups, weight, bias, epsilon);
+  return record(name, as_is ? y : y.to(x.scalar_type()));
 }
 
 at::Tensor LayerNorm::operator()(const at::Tensor& x, const Recorder& record) const {

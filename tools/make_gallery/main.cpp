@@ -1,0 +1,127 @@
+// Makes the gallery: every asset with its prompt through `patina enhance`, a strip of pictures of each, and
+// the page that shows them. Goes on where it was stopped.
+//
+//   make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] [--only NAME]
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "mini_data/console.h"
+#include "patina/asset/asset.h"
+#include "patina/base/files.h"
+#include "patina/image/image_io.h"
+#include "patina/pipeline/bundled_model.h"
+#include "patina/pipeline/enhance.h"
+#include "strip.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace patina;
+
+constexpr int kSide = 256;
+
+struct Entry {
+  const char* name;    // of the picture
+  const char* asset;   // below the shared assets, or from the repository
+  const char* prompt;  // the rest are patina's defaults
+  float strength;
+  int view, other_view;
+};
+
+constexpr Entry kEntries[] = {
+    {"kettle_rust", "examples/kettle.glb", "a rusty old kettle", 0.8f, 1, 5},
+    {"kettle_moss", "examples/kettle.glb", "a kettle covered in moss", 0.8f, 1, 5},
+    {"kettle_scratches", "examples/kettle.glb", "a slightly scratched kettle", 0.6f, 1, 5},
+    {"kettle_copper", "examples/kettle.glb", "a kettle of green copper patina", 0.8f, 1, 5},
+    {"bottle_mud", "WaterBottle/WaterBottle.gltf", "a muddy bottle", 0.8f, 1, 5},
+    {"bottle_paint", "WaterBottle/WaterBottle.gltf", "a bottle with peeling paint", 0.8f, 1, 5},
+    {"car_rust", "ToyCar/ToyCar.gltf", "a heavily rusted toy car", 0.8f, 1, 5},
+    {"car_snow", "ToyCar/ToyCar.gltf", "a toy car covered in snow", 0.8f, 1, 5},
+    {"shoe_leather", "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "a shoe of worn leather", 0.8f, 1,
+     5},
+    {"shoe_dust", "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "a dusty old shoe", 0.8f, 1, 5},
+    {"suzanne_stone", "Suzanne/Suzanne.gltf", "a mossy stone statue", 0.9f, 1, 5},
+    {"suzanne_wood", "Suzanne/Suzanne.gltf", "a head of weathered wood", 0.9f, 1, 5},
+    {"boombox_corroded", "BoomBoxWithAxes/BoomBoxWithAxes.gltf", "a corroded iron boombox", 0.8f, 1, 5},
+    {"spot_terracotta", "Spot/spot_triangulated.obj", "a terracotta cow", 0.9f, 1, 5},
+};
+
+struct Arguments {
+  fs::path model = "models/patina-mini", shared = "../shared", work = "build/gallery", docs = "docs";
+  std::string only;
+};
+
+fs::path asset_path(const Entry& entry, const Arguments& arguments) {
+  const fs::path own = entry.asset;
+  return fs::exists(own) ? own : arguments.shared / "assets" / own;
+}
+
+/// Markdown of one entry.
+std::string section(const Entry& entry, const fs::path& asset) {
+  return fmt::format(
+      "![{0}: {1}](images/gallery/{2}.jpg)\n\n    patina enhance {0} --prompt \"{1}\" --strength {3} -o "
+      "OUT.glb\n\n",
+      asset.filename().string(), entry.prompt, entry.name, entry.strength);
+}
+
+void make(const Arguments& arguments) {
+  std::string page = read_text_file(arguments.docs / "gallery_head.md");
+  for (const Entry& entry : kEntries) {
+    const fs::path asset = asset_path(entry, arguments);
+    page += section(entry, asset);
+    if (!arguments.only.empty() && arguments.only != entry.name) continue;
+    pipeline::Config config;
+    config.asset = asset;
+    config.output = arguments.work / (std::string(entry.name) + ".glb");
+    config.detail.prompt = entry.prompt;
+    config.detail.strength = entry.strength;
+    config.model.model = arguments.model;
+    config.turntable_frames = 0;
+    pipeline::settle(config);
+    fs::create_directories(arguments.work);
+    const fs::path folder = pipeline::run_folder_path(config);
+    {
+      pipeline::RunFolder run(folder);
+      pipeline::enhance(config, run, mini_data::console_progress());
+    }
+    write_image(arguments.docs / "images" / "gallery" / (std::string(entry.name) + ".jpg"),
+                make_gallery::strip(folder, asset::read_asset(asset), asset::read_asset(config.output),
+                                    entry.view, entry.other_view, kSide));
+    std::printf("%s\n", entry.name);
+  }
+  write_file(arguments.docs / "gallery.md", page);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  const std::map<std::string, fs::path*> paths{{"--model", &arguments.model},
+                                               {"--shared", &arguments.shared},
+                                               {"--work", &arguments.work},
+                                               {"--docs", &arguments.docs}};
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const auto path = paths.find(argv[i]);
+    if (path != paths.end()) {
+      *path->second = argv[i + 1];
+    } else if (std::string(argv[i]) == "--only") {
+      arguments.only = argv[i + 1];
+    } else {
+      std::fprintf(stderr,
+                   "usage: make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] "
+                   "[--only NAME]\n");
+      return 2;
+    }
+  }
+  try {
+    make(arguments);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "make_gallery: %s\n", error.what());
+    return 1;
+  }
+}

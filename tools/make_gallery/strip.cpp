@@ -1,0 +1,52 @@
+#include "strip.h"
+
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "patina/asset/material_maps.h"
+#include "patina/image/color.h"
+#include "patina/image/image_io.h"
+#include "patina/report/report.h"
+
+namespace patina::make_gallery {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Mean |difference| of two maps, the smaller enlarged.
+double change(const asset::Map& before, const asset::Map& after) {
+  const Image a = asset::resized(before, after.texels.width, after.texels.height).texels;
+  double sum = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) sum += std::abs(a.pixels[i] - after.texels.pixels[i]);
+  return sum / static_cast<double>(a.pixels.size());
+}
+
+Image shown(const asset::Map& map, int side) {
+  return srgb_from_linear(asset::resized(map, side, side).texels);
+}
+
+}  // namespace
+
+Image strip(const fs::path& run, const asset::Asset& before, const asset::Asset& after, int view,
+            int other_view, int side) {
+  const auto picture = [&](const char* pattern, int which) {
+    return read_image(run / fmt::format(fmt::runtime(pattern), which));
+  };
+  std::vector<Image> pictures{picture("views/tile_{:02}.png", view), picture("detail/edited_{:02}.png", view),
+                              picture("report/rendered_{:02}.png", view),
+                              picture("report/rendered_{:02}.png", other_view)};
+  const auto old_maps = asset::resolve_materials(before), new_maps = asset::resolve_materials(after);
+  size_t most = 0;
+  double largest = -1;
+  for (size_t m = 0; m < new_maps.size(); ++m) {
+    const double changed = change(old_maps[m].base_color, new_maps[m].base_color);
+    if (changed > largest) most = m, largest = changed;
+  }
+  pictures.push_back(shown(old_maps[most].base_color, side));
+  pictures.push_back(shown(new_maps[most].base_color, side));
+  return report::contact_sheet(pictures, static_cast<int>(pictures.size()), side);
+}
+
+}  // namespace patina::make_gallery
