@@ -5,9 +5,11 @@
 
 #include <ATen/ATen.h>
 #include <ATen/CPUGeneratorImpl.h>
+#include <c10/core/InferenceMode.h>
 
 #include <gtest/gtest.h>
 
+#include "patina/base/parallel.h"
 #include "patina/nn/attend.h"
 
 namespace patina::nn {
@@ -48,6 +50,90 @@ TEST(GroupNorm, costs_bf16_nothing_but_the_rounding_of_input_and_output) {
   const at::Tensor x = random({1, 8, 64, 64}, 4).to(at::kBFloat16);
   const at::Tensor expected = plain_group_norm(layer, x.to(at::kFloat));
   EXPECT_LE(max_difference(layer(x, {}), expected), expected.abs().max().item<double>() / 256);
+}
+
+/// Largest error that rounding the result to the type of x explains, and little more.
+double tolerance(const at::Tensor& x, const at::Tensor& expected) {
+  return expected.abs().max().item<double>() * (x.scalar_type() == at::kBFloat16 ? 1.0 / 256 : 3e-6) + 1e-6;
+}
+
+// Without gradients our own kernels work; the cases above also ran LibTorch's.
+TEST(Kernels, group_norm_equals_its_definition_with_and_without_silu) {
+  const c10::InferenceMode inference;
+  struct Case {
+    int64_t batch, channels, groups, height, width;
+  };
+  for (const Case& c : {Case{1, 8, 2, 1, 1}, {2, 12, 4, 7, 5}, {1, 320, 32, 33, 17}, {3, 6, 6, 64, 3}}) {
+    const GroupNorm layer = group_norm(c.channels, c.groups);
+    for (const at::ScalarType type : {at::kFloat, at::kBFloat16}) {
+      const at::Tensor x = (random({c.batch, c.channels, c.height, c.width}, 3) * 3 + 5).to(type);
+      const at::Tensor expected = plain_group_norm(layer, x.to(at::kFloat));
+      for (const at::Tensor& image : {x, x.contiguous(at::MemoryFormat::ChannelsLast)}) {
+        const at::Tensor y = layer(image, {}), activated = layer.with_silu(image, {});
+        EXPECT_EQ(y.scalar_type(), type);
+        EXPECT_TRUE(y.is_contiguous(at::MemoryFormat::ChannelsLast));
+        EXPECT_LE(max_difference(y, expected), tolerance(x, expected) + (type == at::kFloat ? 2e-5 : 0));
+        EXPECT_LE(max_difference(activated, expected * at::sigmoid(expected)),
+                  tolerance(x, expected) + (type == at::kFloat ? 2e-5 : 0));
+      }
+    }
+  }
+}
+
+TEST(Kernels, group_norm_keeps_its_digits_beside_a_large_mean) {
+  const c10::InferenceMode inference;
+  const GroupNorm layer = group_norm(16, 2);
+  const at::Tensor x = random({1, 16, 96, 96}, 6) * 0.01 + 100;
+  // 0.01 beside 100 has about three digits in f32.
+  EXPECT_LE(max_difference(layer(x, {}), plain_group_norm(layer, x)), 5e-3);
+}
+
+TEST(Kernels, layer_norm_equals_its_definition) {
+  const c10::InferenceMode inference;
+  for (const int64_t channels : {1, 13, 16, 320, 1283}) {
+    const LayerNorm layer{"norm", random({channels}, 1), random({channels}, 2), 1e-5};
+    for (const at::ScalarType type : {at::kFloat, at::kBFloat16}) {
+      const at::Tensor x = (random({2, 9, channels}, 3) * 2 + 7).to(type), wide = x.to(at::kDouble);
+      const at::Tensor centred = wide - wide.mean(-1, true);
+      const at::Tensor expected =
+          centred / (centred.square().mean(-1, true) + 1e-5).sqrt() * layer.weight.to(at::kDouble) +
+          layer.bias.to(at::kDouble);
+      EXPECT_LE(max_difference(layer(x, {}), expected), tolerance(x, expected) + 1e-5) << channels;
+    }
+  }
+}
+
+TEST(Kernels, geglu_equals_its_definition_over_the_whole_range) {
+  const c10::InferenceMode inference;
+  const at::Tensor gate = at::linspace(-12, 12, 4801), value = at::ones_like(gate);
+  const at::Tensor wide = gate.to(at::kDouble);
+  const at::Tensor expected = 0.5 * wide * (1 + at::erf(wide / std::sqrt(2.0)));
+  EXPECT_LE(max_difference(geglu(at::cat({value, gate})), expected), 1e-6);
+  for (const at::ScalarType type : {at::kFloat, at::kBFloat16}) {
+    const at::Tensor x = (random({3, 5, 2 * 77}, 8) * 3).to(type), halves = x.to(at::kDouble);
+    const at::Tensor b = halves.slice(2, 77);
+    const at::Tensor product = halves.slice(2, 0, 77) * (0.5 * b * (1 + at::erf(b / std::sqrt(2.0))));
+    EXPECT_LE(max_difference(geglu(x), product), tolerance(x, product));
+  }
+}
+
+TEST(Kernels, show_numbers_that_are_none) {
+  const c10::InferenceMode inference;
+  for (const at::ScalarType type : {at::kFloat, at::kBFloat16}) {
+    const at::Tensor x = at::full({1, 4, 2, 2}, std::nan(""), at::dtype(type));
+    EXPECT_TRUE(at::isnan(group_norm(4, 2).with_silu(x, {})).all().item<bool>());
+    EXPECT_TRUE(at::isnan(geglu(x)).all().item<bool>());
+  }
+}
+
+TEST(Kernels, give_the_same_bits_on_any_number_of_threads) {
+  const c10::InferenceMode inference;
+  const at::Tensor x = random({1, 64, 128, 130}, 9).to(at::kBFloat16);
+  const GroupNorm layer = group_norm(64, 8);
+  set_num_threads(1);
+  const at::Tensor alone = layer.with_silu(x, {});
+  set_num_threads(0);
+  EXPECT_TRUE(layer.with_silu(x, {}).equal(alone));
 }
 
 TEST(Recorder, hears_every_layer_under_its_name) {

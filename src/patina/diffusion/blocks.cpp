@@ -37,9 +37,9 @@ TransformerBlock load_transformer_block(nn::WeightReader& weights, const std::st
 
 at::Tensor ResnetBlock::operator()(const at::Tensor& x, const at::Tensor& time,
                                    const nn::Recorder& record) const {
-  at::Tensor h = conv1(nn::silu(norm1(x, record)), record);
+  at::Tensor h = conv1(norm1.with_silu(x, record), record);
   if (time_emb_proj) h = h + (*time_emb_proj)(time, record).unsqueeze(-1).unsqueeze(-1);
-  h = conv2(nn::silu(norm2(h, record)), record);
+  h = conv2(norm2.with_silu(h, record), record);
   return record(name, (conv_shortcut ? (*conv_shortcut)(x, record) : x) + h);
 }
 
@@ -64,8 +64,7 @@ at::Tensor Attention::operator()(const at::Tensor& x, const at::Tensor& context,
 }
 
 at::Tensor FeedForward::operator()(const at::Tensor& x, const nn::Recorder& record) const {
-  const std::vector<at::Tensor> halves = net_0_proj(x, record).chunk(2, -1);
-  const at::Tensor gated = record(name + ".net.0", halves[0] * at::gelu(halves[1]));
+  const at::Tensor gated = record(name + ".net.0", nn::geglu(net_0_proj(x, record)));
   return record(name, net_2(gated, record));
 }
 

@@ -187,7 +187,7 @@ at::Tensor UNet::operator()(const UNetInputs& inputs, const nn::Recorder& record
     if (block.upsamplers_0) h = (*block.upsamplers_0)(h, skips.back().size(2), skips.back().size(3), record);
     record(block.name, h);
   }
-  return conv_out_(nn::silu(conv_norm_out_(h, record)), record);
+  return conv_out_(conv_norm_out_.with_silu(h, record), record);
 }
 
 }  // namespace patina::diffusion

@@ -140,7 +140,7 @@ Posterior Vae::encode(const at::Tensor& image, const nn::Recorder& record) const
   at::Tensor h = encoder_.conv_in(image.to(type_).contiguous(at::MemoryFormat::ChannelsLast), record);
   for (const VaeBlock& block : encoder_.down_blocks) h = block(h, record);
   h = encoder_.mid_block(h, record);
-  at::Tensor moments = encoder_.conv_out(nn::silu(encoder_.conv_norm_out(h, record)), record);
+  at::Tensor moments = encoder_.conv_out(encoder_.conv_norm_out.with_silu(h, record), record);
   if (quant_conv_) moments = (*quant_conv_)(moments, record);
   const std::vector<at::Tensor> halves = moments.to(at::kFloat).chunk(2, 1);
   return {halves[0], at::clamp(halves[1], -30.0, 20.0)};
@@ -153,7 +153,7 @@ at::Tensor Vae::decode(const at::Tensor& latents, const nn::Recorder& record) co
   if (post_quant_conv_) h = (*post_quant_conv_)(h, record);
   h = decoder_.mid_block(decoder_.conv_in(h, record), record);
   for (const VaeBlock& block : decoder_.up_blocks) h = block(h, record);
-  return decoder_.conv_out(nn::silu(decoder_.conv_norm_out(h, record)), record).to(at::kFloat);
+  return decoder_.conv_out(decoder_.conv_norm_out.with_silu(h, record), record).to(at::kFloat);
 }
 
 }  // namespace patina::diffusion

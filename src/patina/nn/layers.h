@@ -30,7 +30,7 @@ struct Conv2d {
   at::Tensor operator()(const at::Tensor& x, const Recorder& record) const;
 };
 
-/// Over groups of channels of [B,C,...]; statistics in f32 whatever the dtype of x.
+/// Over groups of channels of [B,C,H,W], channels-last out; statistics in f32 whatever the dtype of x.
 struct GroupNorm {
   std::string name;
   at::Tensor weight, bias;  // [C] f32
@@ -38,6 +38,8 @@ struct GroupNorm {
   double epsilon = 1e-5;
 
   at::Tensor operator()(const at::Tensor& x, const Recorder& record) const;
+  /// silu((*this)(x)) in one pass where nobody listens in between.
+  at::Tensor with_silu(const at::Tensor& x, const Recorder& record) const;
 };
 
 /// Over the last axis; statistics in f32 whatever the dtype of x.
@@ -63,6 +65,8 @@ LayerNorm load_layer_norm(WeightReader& weights, const std::string& name, int64_
 
 /// x · sigmoid(x).
 at::Tensor silu(const at::Tensor& x);
+/// [..., 2n] -> [..., n]: the first half times GELU of the second [Shazeer2020].
+at::Tensor geglu(const at::Tensor& x);
 /// x · sigmoid(1.702 x), CLIP's approximation of GELU.
 at::Tensor quick_gelu(const at::Tensor& x);
 

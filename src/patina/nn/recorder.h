@@ -16,6 +16,8 @@ class Recorder {
   Recorder() = default;
   explicit Recorder(Sink sink) : sink_(std::move(sink)) {}
 
+  bool listens() const { return static_cast<bool>(sink_); }
+
   /// Passes `output` through.
   const at::Tensor& operator()(const std::string& module_path, const at::Tensor& output) const {
     if (sink_) sink_(module_path, output);

@@ -1,0 +1,161 @@
+// Stable Diffusion 1.5's networks at full size with random weights: seconds, share of the machine's matrix
+// peak, and where the time goes. Prints and writes JSON.
+//
+//   bench_unet [--out build/bench/unet.json] [--views 1] [--size 512] [--threads N] [--f32] [--repeat 5]
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+
+#include <ATen/ATen.h>
+#include <ATen/Parallel.h>
+#include <c10/core/InferenceMode.h>
+#include <nlohmann/json.hpp>
+
+#include "make_checkpoint/configs.h"
+#include "operation_times.h"
+#include "patina/base/files.h"
+#include "patina/base/parallel.h"
+#include "patina/diffusion/controlnet.h"
+#include "patina/diffusion/unet.h"
+#include "patina/diffusion/vae.h"
+#include "patina/nn/threads.h"
+#include "random_weights.h"
+
+namespace {
+
+using namespace patina;
+using bench::RandomWeights;
+
+double best_seconds(int repeat, const std::function<void()>& work) {
+  double best = 1e30;
+  for (int i = 0; i < repeat; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return best;
+}
+
+/// GFLOP/s of LibTorch's product of two square matrices, all threads.
+double matrix_peak(at::ScalarType type, int repeat) {
+  constexpr int64_t kSide = 2048;
+  const at::Tensor a = at::randn({kSide, kSide}).to(type), b = at::randn({kSide, kSide}).to(type);
+  at::Tensor out = at::matmul(a, b);
+  const double seconds = best_seconds(3 * repeat, [&] { at::matmul_out(out, a, b); });
+  return 2e-9 * static_cast<double>(kSide * kSide * kSide) / seconds;
+}
+
+/// Operations of every layer with a weight, and of attention: 4 · queries · keys · channels.
+class FlopCount {
+ public:
+  explicit FlopCount(const RandomWeights& weights) : weights_(weights) {}
+
+  nn::Recorder recorder() {
+    return nn::Recorder([this](const std::string& name, const at::Tensor& output) {
+      const auto numbers = static_cast<double>(output.numel());
+      flops_ += weights_.flops_an_output(name) * numbers;
+      const auto ends_with = [&](const char* end) {
+        return name.size() >= std::strlen(end) &&
+               name.compare(name.size() - std::strlen(end), name.npos, end) == 0;
+      };
+      if (ends_with(".to_k")) keys_ = static_cast<double>(output.size(1));
+      if (ends_with(".attn1") || ends_with(".attn2")) flops_ += 4 * numbers * keys_;
+    });
+  }
+  double flops() const { return flops_; }
+
+ private:
+  const RandomWeights& weights_;
+  double flops_ = 0, keys_ = 0;
+};
+
+struct Options {
+  std::string out;
+  int64_t side = 512, grid = 1;
+  int repeat = 5;
+  at::ScalarType type = at::kBFloat16;
+};
+
+nlohmann::json measure(const Options& options) {
+  const c10::InferenceMode inference;
+  at::manual_seed(1);
+  const make_checkpoint::Configs configs =
+      make_checkpoint::configs_of(diffusion::Family::kSd1, make_checkpoint::Size::kFull);
+  nlohmann::json result;
+  const double peak = matrix_peak(options.type, options.repeat);
+  result["matrix_peak_gflops"] = peak;
+
+  RandomWeights unet_weights;
+  nn::WeightReader unet_reader(unet_weights, options.type);
+  const diffusion::UNet unet(configs.unet, unet_reader);
+  const int64_t latents = options.side / 8 * options.grid;
+  const at::Tensor sample = at::randn({1, 4, latents, latents}), time = at::full({1}, 500.0f),
+                   text = at::randn({1, 77, 768});
+  FlopCount count(unet_weights);
+  unet({sample, time, text, nullptr}, count.recorder());
+  const auto evaluate = [&] { unet({sample, time, text, nullptr}); };
+  const double seconds = best_seconds(options.repeat, evaluate);
+  result["unet_seconds"] = seconds;
+  result["unet_gflop"] = count.flops() * 1e-9;
+  result["unet_gflops"] = count.flops() * 1e-9 / seconds;
+  result["fraction_of_peak"] = count.flops() * 1e-9 / seconds / peak;
+  double inside = 0;
+  for (const auto& [name, share] : bench::operation_seconds(evaluate)) {
+    result["unet_operations"][name] = share;
+    inside += share;
+  }
+  result["unet_operations"]["sum"] = inside;
+
+  RandomWeights vae_weights;
+  nn::WeightReader vae_reader(vae_weights, options.type);
+  const diffusion::Vae vae(configs.vae, vae_reader);
+  const at::Tensor view = at::randn({1, 4, options.side / 8, options.side / 8});
+  const auto decode = [&] { vae.decode(view); };
+  result["vae_decode_seconds"] = best_seconds(std::max(1, options.repeat / 2), decode);
+  for (const auto& [name, share] : bench::operation_seconds(decode)) result["vae_operations"][name] = share;
+
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  result["peak_mb"] = static_cast<double>(usage.ru_maxrss) / 1024;
+  return result;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  nn::sleep_between_parallel_regions(argv);
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string flag = argv[i];
+    const auto number = [&] { return i + 1 < argc ? std::atoi(argv[++i]) : 0; };
+    if (flag == "--size")
+      options.side = number();
+    else if (flag == "--grid")
+      options.grid = number();
+    else if (flag == "--repeat")
+      options.repeat = std::max(1, number());
+    else if (flag == "--threads") {
+      const int threads = number();
+      set_num_threads(threads);
+      at::set_num_threads(threads);
+    } else if (flag == "--f32")
+      options.type = at::kFloat;
+    else if (flag == "--out" && i + 1 < argc)
+      options.out = argv[++i];
+    else {
+      std::fprintf(
+          stderr,
+          "usage: bench_unet [--size 512] [--grid 1] [--repeat 5] [--threads N] [--f32] [--out FILE]\n");
+      return 2;
+    }
+  }
+  const nlohmann::json result = measure(options);
+  std::printf("%s\n", result.dump(1).c_str());
+  if (!options.out.empty()) write_file(options.out, result.dump(1) + "\n");
+}
