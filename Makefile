@@ -2,21 +2,23 @@
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
-#   make bench-noise, make bench-attention   measure, print tables, write build/bench/*.json (docs/performance.md)
+#   make bench-noise, bench-attention, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
+#   make gallery      the pictures of docs/gallery.md
 #   make bench-mini   how good the small model is: build/bench/mini.json and pictures (docs/measuring-mini.md)
 
 JOBS ?= $(shell nproc)
 DEMO_DIR := build/demo
-DEMO_MODEL ?= tests/data/tiny-sd
+DEMO_MODEL ?= models/patina-mini
 DEMO_PROMPT ?= a rusty old kettle
 # The demo's main command, which leaves its results in folder $(1).
 demo_command = build/release/patina enhance examples/kettle.glb --prompt "$(DEMO_PROMPT)" --model $(DEMO_MODEL) \
-	  --views 9 --resolution 256 --steps 20 --strength 0.5 --bias 1.2 -o $(1)/kettle.glb
+	  -o $(1)/kettle.glb
 MINI_MODEL ?= models/patina-mini
 MINI_SHARDS ?= build/mini_shards
+PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-mini clean format tidy
+.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-unet bench-mini gallery clean format tidy
 
 setup:
 	@scripts/setup.sh
@@ -36,9 +38,6 @@ demo: build
 	@echo
 	@echo "The enhanced kettle:  $(CURDIR)/$(DEMO_DIR)/kettle.glb"
 	@echo "The report:           $(CURDIR)/$(DEMO_DIR)/kettle.patina-run/report.html"
-	@if [ "$(DEMO_MODEL)" = tests/data/tiny-sd ]; then \
-	  echo "The model of this demo has random weights: it shows the whole way, not rust. For rust, give a Stable Diffusion 1.5"; \
-	  echo "folder with ControlNets:  make demo DEMO_MODEL=/path/to/model"; fi
 
 bench-programs: setup
 	@cmake --preset release -DPATINA_BUILD_BENCH=ON
@@ -56,6 +55,18 @@ bench-attention: setup
 	OMP_WAIT_POLICY=passive build/release/bench_attention build/bench/attention.json
 	@if nvidia-smi > /dev/null 2>&1; then python3 bench/bench_attention_cuda.py --report build/bench/attention.json; \
 	else echo "No GPU here; where there is one:  python3 bench/bench_attention_cuda.py"; fi
+
+bench-unet: setup
+	@cmake --preset release -DPATINA_BUILD_BENCH=ON
+	@cmake --build build/release --parallel $(JOBS) --target bench_unet
+	build/release/bench_unet --out build/bench/unet.json
+	@if $(PEER_PYTHON) -c "import diffusers" 2> /dev/null; then $(PEER_PYTHON) bench/unet/diffusers_peer.py --report build/bench/unet.json; \
+	else echo "No diffusers beside this; how to have it:  python3 bench/unet/diffusers_peer.py --help"; fi
+
+gallery: setup
+	@cmake --preset release -DPATINA_BUILD_BENCH=ON
+	@cmake --build build/release --parallel $(JOBS) --target make_gallery
+	OMP_WAIT_POLICY=passive build/release/make_gallery --shared $(SHARED)
 
 # The demo is timed in a folder of its own, from nothing. Shards that are not there are made first, in some ten minutes.
 bench-mini: DEMO_MODEL = $(MINI_MODEL)

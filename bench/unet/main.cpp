@@ -97,11 +97,12 @@ nlohmann::json measure(const Options& options) {
   const int64_t latents = options.side / 8 * options.grid;
   const at::Tensor sample = at::randn({1, 4, latents, latents}), time = at::full({1}, 500.0f),
                    text = at::randn({1, 77, 768});
+  const std::string size = std::to_string(options.side * options.grid);
   FlopCount count(unet_weights);
   unet({sample, time, text, nullptr}, count.recorder());
   const auto evaluate = [&] { unet({sample, time, text, nullptr}); };
   const double seconds = best_seconds(options.repeat, evaluate);
-  result["unet_seconds"] = seconds;
+  result["unet_" + size + "_seconds"] = seconds;
   result["unet_gflop"] = count.flops() * 1e-9;
   result["unet_gflops"] = count.flops() * 1e-9 / seconds;
   result["fraction_of_peak"] = count.flops() * 1e-9 / seconds / peak;
@@ -117,7 +118,7 @@ nlohmann::json measure(const Options& options) {
   const diffusion::Vae vae(configs.vae, vae_reader);
   const at::Tensor view = at::randn({1, 4, options.side / 8, options.side / 8});
   const auto decode = [&] { vae.decode(view); };
-  result["vae_decode_seconds"] = best_seconds(std::max(1, options.repeat / 2), decode);
+  result["vae_decode_" + std::to_string(options.side) + "_seconds"] = best_seconds(std::max(1, options.repeat / 2), decode);
   for (const auto& [name, share] : bench::operation_seconds(decode)) result["vae_operations"][name] = share;
 
   rusage usage{};
