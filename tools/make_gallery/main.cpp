@@ -69,31 +69,39 @@ std::string section(const Entry& entry, const fs::path& asset) {
       asset.filename().string(), entry.prompt, entry.name, entry.strength);
 }
 
+fs::path picture_path(const Entry& entry, const Arguments& arguments) {
+  return arguments.docs / "images" / "gallery" / (std::string(entry.name) + ".jpg");
+}
+
+void make_picture(const Entry& entry, const Arguments& arguments) {
+  pipeline::Config config;
+  config.asset = asset_path(entry, arguments);
+  config.output = arguments.work / (std::string(entry.name) + ".glb");
+  config.detail.prompt = entry.prompt;
+  config.detail.strength = entry.strength;
+  config.model.model = arguments.model;
+  config.turntable_frames = 0;
+  pipeline::settle(config);
+  fs::create_directories(arguments.work);
+  const fs::path folder = pipeline::run_folder_path(config);
+  {
+    pipeline::RunFolder run(folder);
+    pipeline::enhance(config, run, mini_data::console_progress());
+  }
+  write_image(picture_path(entry, arguments),
+              make_gallery::strip(folder, asset::read_asset(config.asset), asset::read_asset(config.output),
+                                  entry.view, entry.other_view, kSide));
+}
+
 void make(const Arguments& arguments) {
-  std::string page = read_text_file(arguments.docs / "gallery_head.md");
   for (const Entry& entry : kEntries) {
-    const fs::path asset = asset_path(entry, arguments);
-    page += section(entry, asset);
     if (!arguments.only.empty() && arguments.only != entry.name) continue;
-    pipeline::Config config;
-    config.asset = asset;
-    config.output = arguments.work / (std::string(entry.name) + ".glb");
-    config.detail.prompt = entry.prompt;
-    config.detail.strength = entry.strength;
-    config.model.model = arguments.model;
-    config.turntable_frames = 0;
-    pipeline::settle(config);
-    fs::create_directories(arguments.work);
-    const fs::path folder = pipeline::run_folder_path(config);
-    {
-      pipeline::RunFolder run(folder);
-      pipeline::enhance(config, run, mini_data::console_progress());
-    }
-    write_image(arguments.docs / "images" / "gallery" / (std::string(entry.name) + ".jpg"),
-                make_gallery::strip(folder, asset::read_asset(asset), asset::read_asset(config.output),
-                                    entry.view, entry.other_view, kSide));
+    make_picture(entry, arguments);
     std::printf("%s\n", entry.name);
   }
+  std::string page = read_text_file(arguments.docs / "gallery_head.md");
+  for (const Entry& entry : kEntries)
+    if (fs::exists(picture_path(entry, arguments))) page += section(entry, asset_path(entry, arguments));
   write_file(arguments.docs / "gallery.md", page);
 }
 

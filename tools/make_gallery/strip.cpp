@@ -15,12 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Mean |difference| of two maps, the smaller enlarged.
+/// Share of numbers that differ visibly between two maps, the smaller enlarged.
 double change(const asset::Map& before, const asset::Map& after) {
+  constexpr float kVisible = 0.01f;
   const Image a = asset::resized(before, after.texels.width, after.texels.height).texels;
-  double sum = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i) sum += std::abs(a.pixels[i] - after.texels.pixels[i]);
-  return sum / static_cast<double>(a.pixels.size());
+  double count = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i)
+    if (std::abs(a.pixels[i] - after.texels.pixels[i]) > kVisible) ++count;
+  return count / static_cast<double>(a.pixels.size());
 }
 
 Image shown(const asset::Map& map, int side) {
