@@ -1,7 +1,7 @@
 // Stable Diffusion 1.5's networks at full size with random weights: seconds, share of the machine's matrix
 // peak, and where the time goes. Prints and writes JSON.
 //
-//   bench_unet [--out build/bench/unet.json] [--views 1] [--size 512] [--threads N] [--f32] [--repeat 5]
+//   bench_unet [--out build/bench/unet.json] [--size 512] [--grid 1] [--threads N] [--f32] [--repeat 5]
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -21,7 +21,6 @@
 #include "operation_times.h"
 #include "patina/base/files.h"
 #include "patina/base/parallel.h"
-#include "patina/diffusion/controlnet.h"
 #include "patina/diffusion/unet.h"
 #include "patina/diffusion/vae.h"
 #include "patina/nn/threads.h"
@@ -118,7 +117,8 @@ nlohmann::json measure(const Options& options) {
   const diffusion::Vae vae(configs.vae, vae_reader);
   const at::Tensor view = at::randn({1, 4, options.side / 8, options.side / 8});
   const auto decode = [&] { vae.decode(view); };
-  result["vae_decode_" + std::to_string(options.side) + "_seconds"] = best_seconds(std::max(1, options.repeat / 2), decode);
+  result["vae_decode_" + std::to_string(options.side) + "_seconds"] =
+      best_seconds(std::max(1, options.repeat / 2), decode);
   for (const auto& [name, share] : bench::operation_seconds(decode)) result["vae_operations"][name] = share;
 
   rusage usage{};

@@ -26,11 +26,11 @@ using namespace patina;
 constexpr int kSide = 256;
 
 struct Entry {
-  const char* name;    // of the picture
-  const char* asset;   // below the shared assets, or from the repository
-  const char* prompt;  // the rest are patina's defaults
-  float strength;
-  int view, other_view;
+  const char* name;   // of the picture
+  const char* asset;  // below the shared assets, or from the repository
+  const char* prompt;
+  float strength;        // the other options are patina's defaults
+  int view, other_view;  // shown
 };
 
 constexpr Entry kEntries[] = {
@@ -99,7 +99,7 @@ void make(const Arguments& arguments) {
     make_picture(entry, arguments);
     std::printf("%s\n", entry.name);
   }
-  std::string page = read_text_file(arguments.docs / "gallery_head.md");
+  std::string page = read_text_file("tools/make_gallery/head.md");
   for (const Entry& entry : kEntries)
     if (fs::exists(picture_path(entry, arguments))) page += section(entry, asset_path(entry, arguments));
   write_file(arguments.docs / "gallery.md", page);
@@ -113,11 +113,11 @@ int main(int argc, char** argv) {
                                                {"--shared", &arguments.shared},
                                                {"--work", &arguments.work},
                                                {"--docs", &arguments.docs}};
-  for (int i = 1; i + 1 < argc; i += 2) {
+  for (int i = 1; i < argc; i += 2) {
     const auto path = paths.find(argv[i]);
-    if (path != paths.end()) {
+    if (i + 1 < argc && path != paths.end()) {
       *path->second = argv[i + 1];
-    } else if (std::string(argv[i]) == "--only") {
+    } else if (i + 1 < argc && std::string(argv[i]) == "--only") {
       arguments.only = argv[i + 1];
     } else {
       std::fprintf(stderr,

@@ -38,7 +38,7 @@ void lay_colour_path(Parameters& parameters) {
       value.slice(0, 0, kColours).zero_();
     } else if (contains(name, "conv_norm_out")) {
       if (!weight) value.slice(0, 0, kColours).fill_(kSiluOffset);
-    } else if (value.dim() == 4 && !contains(name, "resnets.0.conv1") && !contains(name, "resnets.1.conv1")) {
+    } else if (value.dim() == 4 && !contains(name, ".conv1.")) {
       const at::Tensor kernel = passing_kernel(name, value.size(2));
       const int64_t passed = contains(name, "quant_conv") ? value.size(0) : kColours;
       value.slice(0, 0, passed).zero_();

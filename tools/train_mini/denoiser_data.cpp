@@ -11,7 +11,6 @@ namespace {
 
 using mini_data::kViewSide;
 
-constexpr int64_t kTile = 0, kNormal = 1;  // pictures of a sample
 constexpr int64_t kGroupViews = 4;
 
 }  // namespace

@@ -27,13 +27,13 @@ constexpr const char* kUsage =
     "       train_mini captions SHARDS [--count N]            print captions, for the tokenizer\n"
     "       train_mini vae WORK MODEL [--decoder-only]        train the autoencoder\n"
     "       train_mini latents WORK MODEL                     encode the samples with it\n"
+    "       train_mini words WORK MODEL                       teach the text encoder what words look like\n"
     "       train_mini denoiser WORK MODEL                    train text encoder, U-Net and ControlNets\n"
-    "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects      under fixed "
-    "prompts\n"
-    "options of both trainings: --minutes M (60), --rate R, --settle (the rate falls to zero), --batch N, "
-    "--cuda\n"
-    "Each goes on where it was stopped or killed. MODEL holds config.json of every component and gets the "
-    "weights.\n";
+    "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects, fixed prompts\n"
+    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero); of vae and\n"
+    "denoiser: --batch N, --cuda\n"
+    "Each goes on where it was stopped or killed; words, which takes a minute, is refused once there is a\n"
+    "text encoder. MODEL holds config.json of every component and gets the weights.\n";
 
 constexpr int64_t kSheetRows = 6;
 

@@ -21,6 +21,9 @@ struct Sample {
   int group_views = 1, view = 0;
 };
 
+/// Pictures of a sample, in the order of a record.
+inline constexpr int64_t kTile = 0, kNormal = 1, kTarget = 2;
+
 /// FOLDER/pictures.u8 holds one record a sample, bytes [3 pictures, 3 channels, 256, 256]: tile, normal and
 /// target as mini_data::Batch has them, 255 means 1. FOLDER/samples.jsonl holds one line a sample.
 class SampleFolder {

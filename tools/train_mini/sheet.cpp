@@ -11,7 +11,6 @@
 namespace patina::train_mini {
 namespace {
 
-constexpr int64_t kTile = 0, kNormal = 1;  // pictures of a sample
 constexpr const char* kPrompts[] = {
     "a rusty old kettle",          "heavily corroded iron", "covered in moss", "peeling paint",
     "slightly scratched",          "covered in snow",       "weathered wood",  "green copper patina",

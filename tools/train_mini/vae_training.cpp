@@ -29,8 +29,7 @@ using diffusion::Vae;
 using diffusion::VaeConfig;
 
 constexpr double kKlWeight = 1e-4, kGradientWeight = 0.5, kColourWeight = 1;
-constexpr int64_t kRecolouredOneIn = 3;    // crops
-constexpr int64_t kTile = 0, kTarget = 2;  // pictures of a sample
+constexpr int64_t kRecolouredOneIn = 3;  // crops
 constexpr double kCheckpointSeconds = 180;
 constexpr int64_t kHeldOutPictures = 24;
 

@@ -11,6 +11,7 @@
 
 #include "captions.h"
 #include "parameters.h"
+#include "patina/base/error.h"
 #include "patina/diffusion/text_encoder.h"
 #include "patina/diffusion/tokenizer.h"
 #include "samples.h"
@@ -20,7 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kTile = 0, kTarget = 2;  // pictures of a sample
 constexpr int64_t kBatch = 96;
 constexpr int64_t kLooks = 12;  // mean and spread of three colours, and what both differ by from the tile's
 
@@ -68,6 +68,10 @@ Captioned captioned(const SampleFolder& samples, std::map<std::string, int64_t>&
 }  // namespace
 
 void train_words(const fs::path& work, const fs::path& model, const RunOptions& options) {
+  const fs::path checkpoint = work / "text_encoder.checkpoint";
+  if (fs::exists(checkpoint))
+    throw Error(ErrorCode::kUsage, checkpoint.string(),
+                "a text encoder was trained already; remove it and the denoiser's checkpoints to begin anew");
   const diffusion::Tokenizer tokenizer(model / "tokenizer");
   const auto config = diffusion::read_text_encoder_config(model / "text_encoder");
   std::map<std::string, int64_t> class_ids;
@@ -120,7 +124,7 @@ void train_words(const fs::path& work, const fs::path& model, const RunOptions& 
   std::printf("held out: %.3f of the looks' variance is left, %.1f %% of the classes are right\n",
               error.item<double>() / (looks - looks.mean(0)).square().mean().item<double>(),
               100 * right.to(at::kFloat).mean().item<double>());
-  text.write(work / "text_encoder.checkpoint");
+  text.write(checkpoint);
   text.write_result(model / "text_encoder" / "model.safetensors");
 }
 
