@@ -35,7 +35,7 @@ vec3 sum_over_pixels(const inverse::LightCache& cache, render::BsdfModel model) 
     const auto& sample = cache.samples[s];
     if (!sample.hit) continue;
     const auto shading = inverse::shade_values(sample.point, sample.base);
-    sum += inverse::shade(model, sample, shading, cache.lights_of(s));
+    sum += inverse::Shader(model).shade(sample, shading, cache.lights_of(s));
   }
   return sum;
 }
@@ -51,7 +51,7 @@ TEST(light_cache, image_agrees_with_the_path_tracer) {
         inverse::CacheOptions options;
         options.max_depth = depth;
         options.generation = generation;
-        const auto cache = inverse::build_cache(world.scene, views, pixels, world.maps, options, {});
+        const auto cache = traced_cache(world, views, options);
         cached.add(luminance(sum_over_pixels(cache, world.scene.bsdf_model())));
 
         render::PathOptions path;
@@ -116,15 +116,16 @@ TEST(light_cache, gradient_agrees_with_path_replay) {
       inverse::CacheOptions options;
       options.max_depth = 1;
       options.generation = generation;
-      const auto cache = inverse::build_cache(world.scene, views, pixels, world.maps, options, {});
+      const auto cache = traced_cache(world, views, options);
       auto from_cache = inverse::zero_gradients(world.maps, num_materials);
       for (size_t s = 0; s < cache.samples.size(); ++s) {
         const auto& sample = cache.samples[s];
         if (!sample.hit || sample.point.material > 1) continue;
         const auto shading = inverse::shade_values(sample.point, sample.base);
+        inverse::Shader shader(world.scene.bsdf_model());
+        shader.shade(sample, shading, cache.lights_of(s));
         inverse::splat(from_cache, world.maps[sample.point.material], sample.point,
-                       inverse::shade_adjoint(world.scene.bsdf_model(), sample, shading, cache.lights_of(s),
-                                              vec3(1.0f)));
+                       shader.adjoint(vec3(1.0f)));
       }
       add(cached, from_cache);
 

@@ -146,16 +146,17 @@ TEST(light_cache, gradients_agree_with_central_differences) {
         const views::ViewSet views = view_of(world);
         inverse::CacheOptions options;
         options.max_depth = depth;
-        const inverse::LightCache cache =
-            inverse::build_cache(world.scene, views, all_pixels(views), world.maps, options, {});
+        const inverse::LightCache cache = traced_cache(world, views, options);
         inverse::TexelGradients gradients =
             inverse::zero_gradients(world.maps, static_cast<int>(world.maps.size()));
+        inverse::Shader shader(model);
         for (size_t s = 0; s < cache.samples.size(); ++s) {
           const auto& sample = cache.samples[s];
           if (!sample.hit) continue;
           const auto shading = inverse::shade_values(sample.point, sample.base);
+          shader.shade(sample, shading, cache.lights_of(s));
           inverse::splat(gradients, world.maps[sample.point.material], sample.point,
-                         inverse::shade_adjoint(model, sample, shading, cache.lights_of(s), kAdjoint));
+                         shader.adjoint(kAdjoint));
         }
         for (const Parameter& parameter : kParameters) {
           const Direction direction = direction_of(world.maps, parameter);
@@ -176,7 +177,7 @@ TEST(light_cache, gradients_agree_with_central_differences) {
                   if (!sample.hit) continue;
                   const auto shading = inverse::shade_values(
                       sample.point, inverse::sample_maps(maps[sample.point.material], sample.point));
-                  sum += glm::dot(kAdjoint, inverse::shade(model, sample, shading, cache.lights_of(s)));
+                  sum += glm::dot(kAdjoint, shader.shade(sample, shading, cache.lights_of(s)));
                 }
                 return sum;
               },
@@ -193,16 +194,15 @@ TEST(light_cache, gradients_agree_with_central_differences) {
 TEST(light_cache, vector_shading_equals_the_reference) {
   const World world = make_world(Lighting::kStudio, 8, 16);
   const views::ViewSet views = view_of(world);
-  const inverse::LightCache cache =
-      inverse::build_cache(world.scene, views, all_pixels(views), world.maps, {}, {});
+  const inverse::LightCache cache = traced_cache(world, views, {});
   for (size_t s = 0; s < cache.samples.size(); ++s) {
     const auto& sample = cache.samples[s];
     const auto shading = inverse::shade_values(sample.point, sample.base);
     const auto reference =
         inverse::shade_reference(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s), kAdjoint);
-    const vec3 radiance = inverse::shade(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s));
-    const auto gradient =
-        inverse::shade_adjoint(render::BsdfModel::kGltf, sample, shading, cache.lights_of(s), kAdjoint);
+    inverse::Shader shader(render::BsdfModel::kGltf);
+    const vec3 radiance = shader.shade(sample, shading, cache.lights_of(s));
+    const auto gradient = shader.adjoint(kAdjoint);
     ASSERT_LT(glm::length(radiance - reference.radiance), 1e-4f * (1e-3f + glm::length(reference.radiance)));
     const auto near = [](float a, float b) {
       return std::abs(a - b) <= 2e-3f * (std::abs(a) + std::abs(b)) + 1e-4f;

@@ -119,4 +119,12 @@ std::vector<inverse::CachePixel> all_pixels(const views::ViewSet& views) {
   return pixels;
 }
 
+inverse::LightCache traced_cache(const World& world, const views::ViewSet& views,
+                                 const inverse::CacheOptions& options) {
+  inverse::LightCache cache;
+  cache.pixels = all_pixels(views);
+  inverse::trace_cache(cache, world.scene, views, world.maps, options, {});
+  return cache;
+}
+
 }  // namespace patina::test

@@ -30,4 +30,8 @@ views::ViewSet view_of(const World& world);
 /// Every pixel that shows materials 0 or 1, weight one, target zero.
 std::vector<inverse::CachePixel> all_pixels(const views::ViewSet& views);
 
+/// The light cache of all these pixels.
+inverse::LightCache traced_cache(const World& world, const views::ViewSet& views,
+                                 const inverse::CacheOptions& options);
+
 }  // namespace patina::test

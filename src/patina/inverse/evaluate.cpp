@@ -1,7 +1,6 @@
 #include "patina/inverse/evaluate.h"
 
 #include <algorithm>
-#include <array>
 
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
@@ -12,17 +11,15 @@ namespace patina::inverse {
 namespace {
 
 constexpr int64_t kPixelsPerTask = 256;
+constexpr int64_t kNumbersPerTask = 1 << 15;
+// Pixels are added to the maps in this many parts side by side, fewer where that many copies of the maps
+// would take more than kPartBytes.
+constexpr size_t kMaxParts = 4;
+constexpr size_t kPartBytes = size_t{256} << 20;
 
-// Fitted maps by material and slot.
-using FieldTable = std::vector<std::array<const FittedMap*, kNumSlots>>;
-FieldTable table_of(std::span<const FittedMap> fitted) {
-  FieldTable table;
-  for (const FittedMap& map : fitted) {
-    const auto m = static_cast<size_t>(map.material);
-    if (table.size() <= m) table.resize(m + 1);
-    table[m][static_cast<size_t>(map.slot)] = &map;
-  }
-  return table;
+bool same_layout(const asset::Map& a, const asset::Map& b) {
+  return a.texels.width == b.texels.width && a.texels.height == b.texels.height && a.uv_set == b.uv_set &&
+         a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t && a.uv_transform == b.uv_transform;
 }
 
 // How far the stored values of a sample lie beyond their bounds, signed; zero inside.
@@ -33,40 +30,21 @@ struct Overshoot {
 };
 
 // Adds the field's change to `value`, kept within the slot's range; `overshoot` gets what the range cut off.
-void add_change(const FittedMap* map, const vec2& uv, float* value, float* overshoot) {
-  if (!map) return;
-  const asset::Map& delta = map->field.delta;
-  const asset::BilinearTap tap = asset::bilinear_tap(delta, uv);
-  const auto channels = static_cast<size_t>(delta.texels.channels);
-  const Range range = slot_range(map->slot);
+void add_change(const FittedMap& map, const asset::BilinearTap& tap, float* value, float* overshoot) {
+  const Image& delta = map.field.delta.texels;
+  const auto channels = static_cast<size_t>(delta.channels);
+  const Range range = slot_range(map.slot);
+  const float* texel[4];
+  for (size_t t = 0; t < 4; ++t)
+    texel[t] = delta.pixels.data() + static_cast<size_t>(tap.texel[t]) * channels;
   for (size_t c = 0; c < channels; ++c) {
-    float change = 0;
-    for (size_t t = 0; t < 4; ++t)
-      change += tap.weight[t] * delta.texels.pixels[static_cast<size_t>(tap.texel[t]) * channels + c];
-    const float moved = stored_from_value(map->slot, value[c]) + change;
+    const float change = tap.weight[0] * texel[0][c] + tap.weight[1] * texel[1][c] +
+                         tap.weight[2] * texel[2][c] + tap.weight[3] * texel[3][c];
+    const float moved = stored_from_value(map.slot, value[c]) + change;
     const float kept = std::clamp(moved, range.low, range.high);
-    value[c] = value_from_stored(map->slot, kept);
+    value[c] = value_from_stored(map.slot, kept);
     overshoot[c] = moved - kept;
   }
-}
-
-struct CurrentValues {
-  MapValues values;
-  Overshoot overshoot;
-};
-CurrentValues current_values(const FieldTable& table, const CacheSample& sample) {
-  CurrentValues current{sample.base, {}};
-  if (sample.point.material >= table.size()) return current;
-  const auto& maps = table[sample.point.material];
-  const auto add = [&](Slot slot, float* value, float* overshoot) {
-    const auto s = static_cast<size_t>(slot);
-    add_change(maps[s], sample.point.uv[s], value, overshoot);
-  };
-  add(Slot::kBaseColor, &current.values.base_color.x, &current.overshoot.base_color.x);
-  add(Slot::kRoughness, &current.values.roughness, &current.overshoot.roughness);
-  add(Slot::kMetallic, &current.values.metallic, &current.overshoot.metallic);
-  add(Slot::kNormal, &current.values.normal.x, &current.overshoot.normal.x);
-  return current;
 }
 
 // Beyond a bound the data say nothing about how far to go; a spring leads back, so that a value that overshot
@@ -77,14 +55,14 @@ float bounded(float gradient, float overshoot, float weight) {
   return inward + weight * overshoot;
 }
 // From the map values to what the fitted maps store.
-void to_stored(MapGradient& gradient, const CurrentValues& current, float weight) {
+void to_stored(MapGradient& gradient, const MapValues& values, const Overshoot& overshoot, float weight) {
   for (int c = 0; c < 3; ++c) {
-    const float stored = stored_from_value(Slot::kBaseColor, current.values.base_color[c]);
+    const float stored = stored_from_value(Slot::kBaseColor, values.base_color[c]);
     gradient.base_color[c] = bounded(gradient.base_color[c] * d_value_d_stored(Slot::kBaseColor, stored),
-                                     current.overshoot.base_color[c], weight);
+                                     overshoot.base_color[c], weight);
   }
-  gradient.roughness = bounded(gradient.roughness, current.overshoot.roughness, weight);
-  gradient.metallic = bounded(gradient.metallic, current.overshoot.metallic, weight);
+  gradient.roughness = bounded(gradient.roughness, overshoot.roughness, weight);
+  gradient.metallic = bounded(gradient.metallic, overshoot.metallic, weight);
 }
 
 const float* slot_gradient(const MapGradient& gradient, Slot slot) {
@@ -101,73 +79,168 @@ const float* slot_gradient(const MapGradient& gradient, Slot slot) {
   return &gradient.normal.x;
 }
 
-}  // namespace
-
-Evaluation evaluate(const LightCache& cache, std::span<const vec3> other, std::span<const FittedMap> fitted,
-                    render::BsdfModel model, float gain) {
-  PATINA_CHECK_EQ(other.size(), cache.pixels.size());
-  Evaluation result;
-  result.radiance.resize(cache.pixels.size());
-  const FieldTable table = table_of(fitted);
-  std::vector<float> pixel_loss(cache.pixels.size());
-  std::vector<MapGradient> gradients(cache.samples.size());
-  parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
-    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      const CacheSample& sample = cache.samples[i];
-      const CachePixel& pixel = cache.pixels[i];
-      const CurrentValues current = current_values(table, sample);
-      const Shading shading = shade_values(sample.point, current.values);
-      const vec3 radiance = shade(model, sample, shading, cache.lights_of(i));
-      const PixelLoss loss = relative_l2(radiance, other[i], pixel.target, gain);
-      result.radiance[i] = radiance;
-      pixel_loss[i] = pixel.weight * loss.value;
-      gradients[i] =
-          shade_adjoint(model, sample, shading, cache.lights_of(i), pixel.weight * loss.d_radiance);
-      to_stored(gradients[i], current, pixel.weight);
-    }
-  });
-
-  double loss = 0, weight = 0;
-  for (size_t i = 0; i < pixel_loss.size(); ++i) loss += pixel_loss[i], weight += cache.pixels[i].weight;
-  result.loss = weight > 0 ? static_cast<float>(loss / weight) : 0.0f;
-
-  // One task a map, each adding its samples in order: no two tasks write to one texel, and no order depends
-  // on a thread.
-  result.d_delta.resize(fitted.size());
-  parallel_for(0, static_cast<int64_t>(fitted.size()), 1, [&](int64_t begin, int64_t end) {
-    for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
-      const FittedMap& map = fitted[f];
-      const asset::Map& delta = map.field.delta;
-      Image sum(delta.texels.width, delta.texels.height, delta.texels.channels);
-      const auto channels = static_cast<size_t>(sum.channels);
-      for (size_t s = 0; s < gradients.size(); ++s) {
-        const CacheSample& sample = cache.samples[s];
-        if (!sample.hit || sample.point.material != map.material) continue;
-        const asset::BilinearTap tap =
-            asset::bilinear_tap(delta, sample.point.uv[static_cast<size_t>(map.slot)]);
-        const float* gradient = slot_gradient(gradients[s], map.slot);
-        for (size_t t = 0; t < 4; ++t)
-          for (size_t c = 0; c < channels; ++c)
-            sum.pixels[static_cast<size_t>(tap.texel[t]) * channels + c] += tap.weight[t] * gradient[c];
-      }
-      result.d_delta[f] = std::move(sum);
-    }
-  });
-  return result;
+float* slot_value(MapValues& values, Slot slot) {
+  return const_cast<float*>(slot_gradient(values, slot));
+}
+float* slot_overshoot(Overshoot& overshoot, Slot slot) {
+  switch (slot) {
+    case Slot::kBaseColor:
+      return &overshoot.base_color.x;
+    case Slot::kRoughness:
+      return &overshoot.roughness;
+    case Slot::kMetallic:
+      return &overshoot.metallic;
+    case Slot::kNormal:
+      break;
+  }
+  return &overshoot.normal.x;
 }
 
-std::vector<vec3> shade_pixels(const LightCache& cache, std::span<const FittedMap> fitted,
-                               render::BsdfModel model) {
-  const FieldTable table = table_of(fitted);
+}  // namespace
+
+struct Evaluator::CurrentValues {
+  MapValues values;
+  Overshoot overshoot;
+};
+
+Evaluator::Evaluator(std::span<const FittedMap> fitted, render::BsdfModel model, float gain)
+    : fitted_(fitted), model_(model), gain_(gain) {
+  size_t bytes = 1;
+  for (const FittedMap& map : fitted) {
+    const auto m = static_cast<size_t>(map.material), s = static_cast<size_t>(map.slot);
+    if (materials_.size() <= m) materials_.resize(m + 1);
+    MaterialFields& fields = materials_[m];
+    fields.map[s] = &map;
+    fields.layout[s] = static_cast<int>(s);
+    for (size_t earlier = 0; earlier < s; ++earlier)
+      if (fields.map[earlier] && same_layout(fields.map[earlier]->field.delta, map.field.delta)) {
+        fields.layout[s] = fields.layout[earlier];
+        break;
+      }
+    const Image& texels = map.field.delta.texels;
+    d_delta_.emplace_back(texels.width, texels.height, texels.channels);
+    bytes += texels.pixels.size() * sizeof(float);
+  }
+  parts_.assign(std::clamp<size_t>(kPartBytes / bytes, 1, kMaxParts) - 1, d_delta_);
+}
+
+Evaluator::CurrentValues Evaluator::current_values(const CacheSample& sample) const {
+  CurrentValues current{sample.base, {}};
+  if (sample.point.material >= materials_.size()) return current;
+  const MaterialFields& fields = materials_[sample.point.material];
+  std::array<asset::BilinearTap, kNumSlots> taps;
+  for (const Slot slot : kSlots) {
+    const auto s = static_cast<size_t>(slot);
+    if (!fields.map[s]) continue;
+    const auto layout = static_cast<size_t>(fields.layout[s]);
+    if (layout == s) taps[s] = asset::bilinear_tap(fields.map[s]->field.delta, sample.point.uv[s]);
+    add_change(*fields.map[s], taps[layout], slot_value(current.values, slot),
+               slot_overshoot(current.overshoot, slot));
+  }
+  return current;
+}
+
+std::vector<vec3> Evaluator::shade_pixels(const LightCache& cache) const {
   std::vector<vec3> radiance(cache.pixels.size());
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
+    Shader shader(model_);
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       const CacheSample& sample = cache.samples[i];
-      const Shading shading = shade_values(sample.point, current_values(table, sample).values);
-      radiance[i] = shade(model, sample, shading, cache.lights_of(i));
+      radiance[i] =
+          shader.shade(sample, shade_values(sample.point, current_values(sample).values), cache.lights_of(i));
     }
   });
   return radiance;
+}
+
+float Evaluator::evaluate(const LightCache& cache, std::span<const std::span<const vec3>> others,
+                          std::vector<vec3>& radiance) {
+  PATINA_CHECK(!others.empty());
+  const size_t num_pixels = cache.pixels.size();
+  radiance.resize(num_pixels);
+  pixel_loss_.resize(num_pixels);
+  gradients_.resize(num_pixels);
+  const float share = 1.0f / static_cast<float>(others.size());
+  parallel_for(0, static_cast<int64_t>(num_pixels), kPixelsPerTask, [&](int64_t begin, int64_t end) {
+    Shader shader(model_);
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      const CacheSample& sample = cache.samples[i];
+      const CachePixel& pixel = cache.pixels[i];
+      vec3 other(0.0f);
+      for (const std::span<const vec3> of_cache : others) other += share * of_cache[i];
+      const CurrentValues current = current_values(sample);
+      const Shading shading = shade_values(sample.point, current.values);
+      radiance[i] = shader.shade(sample, shading, cache.lights_of(i));
+      const PixelLoss loss = relative_l2(radiance[i], other, pixel.target, gain_);
+      pixel_loss_[i] = pixel.weight * loss.value;
+      gradients_[i] = shader.adjoint(pixel.weight * loss.d_radiance);
+      to_stored(gradients_[i], current.values, current.overshoot, pixel.weight);
+    }
+  });
+  splat(cache);
+
+  double loss = 0, weight = 0;
+  for (size_t i = 0; i < num_pixels; ++i) loss += pixel_loss_[i], weight += cache.pixels[i].weight;
+  return weight > 0 ? static_cast<float>(loss / weight) : 0.0f;
+}
+
+// Adds the pixels' gradients to the texels that they read. Each task owns one copy of the maps that share a
+// layout and adds its part of the pixels in order; then the copies are added in order.
+void Evaluator::splat(const LightCache& cache) {
+  struct Task {
+    size_t part;
+    int material;
+    size_t layout;
+  };
+  const size_t num_parts = parts_.size() + 1, num_pixels = cache.pixels.size();
+  std::vector<Task> tasks;
+  for (size_t m = 0; m < materials_.size(); ++m)
+    for (size_t s = 0; s < kNumSlots; ++s)
+      if (materials_[m].layout[s] == static_cast<int>(s))
+        for (size_t part = 0; part < num_parts; ++part) tasks.push_back({part, static_cast<int>(m), s});
+  parallel_for(0, static_cast<int64_t>(tasks.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto at = static_cast<size_t>(begin); at < static_cast<size_t>(end); ++at) {
+      const Task& task = tasks[at];
+      const MaterialFields& fields = materials_[static_cast<size_t>(task.material)];
+      struct Target {
+        Slot slot;
+        float* sum;
+        size_t channels;
+      };
+      std::vector<Target> targets;
+      for (const Slot slot : kSlots) {
+        const auto s = static_cast<size_t>(slot);
+        if (fields.layout[s] != static_cast<int>(task.layout)) continue;
+        const auto f = static_cast<size_t>(fields.map[s] - fitted_.data());
+        Image& sum = task.part == 0 ? d_delta_[f] : parts_[task.part - 1][f];
+        std::fill(sum.pixels.begin(), sum.pixels.end(), 0.0f);
+        targets.push_back({slot, sum.pixels.data(), static_cast<size_t>(sum.channels)});
+      }
+      const asset::Map& delta = fields.map[task.layout]->field.delta;
+      const size_t first = num_pixels * task.part / num_parts,
+                   last = num_pixels * (task.part + 1) / num_parts;
+      for (size_t i = first; i < last; ++i) {
+        const CacheSample& sample = cache.samples[i];
+        if (!sample.hit || sample.point.material != task.material) continue;
+        const asset::BilinearTap tap = asset::bilinear_tap(delta, sample.point.uv[task.layout]);
+        for (const Target& target : targets) {
+          const float* gradient = slot_gradient(gradients_[i], target.slot);
+          for (size_t t = 0; t < 4; ++t) {
+            float* texel = target.sum + static_cast<size_t>(tap.texel[t]) * target.channels;
+            for (size_t c = 0; c < target.channels; ++c) texel[c] += tap.weight[t] * gradient[c];
+          }
+        }
+      }
+    }
+  });
+  for (size_t f = 0; f < d_delta_.size(); ++f) {
+    std::vector<float>& sum = d_delta_[f].pixels;
+    parallel_for(0, static_cast<int64_t>(sum.size()), kNumbersPerTask, [&](int64_t begin, int64_t end) {
+      for (const std::vector<Image>& part : parts_)
+        for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i)
+          sum[i] += part[f].pixels[i];
+    });
+  }
 }
 
 }  // namespace patina::inverse

@@ -209,50 +209,52 @@ float learning_rate(const FitOptions& options, int iteration) {
   return options.learning_rate * (0.02f + 0.98f * (0.5f + 0.5f * std::cos(kPi * t)));
 }
 
-void step(FitState& state, Evaluation& evaluation, const FitOptions& options) {
+void add_prior(const FittedMap& map, std::vector<Image>& gradients) {
+  const Prior prior = prior_of(map.slot);
+  float detail = prior.detail;
+  for (size_t level = 0; level < gradients.size(); ++level, detail *= 0.25f) {
+    const std::vector<float>& values = map.field.levels[level].pixels;
+    std::vector<float>& gradient = gradients[level].pixels;
+    parallel_for(0, static_cast<int64_t>(values.size()), 1 << 15, [&](int64_t begin, int64_t end) {
+      for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i)
+        gradient[i] += detail * values[i] / std::sqrt(1.0f + square(values[i] / prior.knee));
+    });
+  }
+}
+
+void step(FitState& state, std::vector<Image>& d_delta, const FitOptions& options) {
   // Without the maps that should come first nothing is worth waiting for.
   const float progress =
       static_cast<float>(state.next_iteration) / static_cast<float>(std::max(1, options.iterations));
   float first_start = 1.0f;
   for (const FittedMap& map : state.fitted) first_start = std::min(first_start, start_of(map.slot));
-  parallel_for(0, static_cast<int64_t>(state.fitted.size()), 1, [&](int64_t begin, int64_t end) {
-    for (auto f = static_cast<size_t>(begin); f < static_cast<size_t>(end); ++f) {
-      FittedMap& map = state.fitted[f];
-      if (progress + first_start < start_of(map.slot)) continue;
-      const Prior prior = prior_of(map.slot);
-      Image& gradient = evaluation.d_delta[f];
-      for (size_t i = 0; i < gradient.pixels.size(); ++i)
-        gradient.pixels[i] += prior.change * map.field.delta.texels.pixels[i];
-      std::vector<Image> gradients = restrict_to_levels(map.field, gradient);
-      float detail = prior.detail;
-      for (size_t level = 0; level < gradients.size(); ++level, detail *= 0.25f)
-        for (size_t i = 0; i < gradients[level].pixels.size(); ++i) {
-          const float value = map.field.levels[level].pixels[i];
-          gradients[level].pixels[i] += detail * value / std::sqrt(1.0f + square(value / prior.knee));
-        }
-      AdamOptions adam;
-      // Levels add up: with all of them in step, a texel moves at twice the rate that was asked for.
-      adam.learning_rate = rate_of(map.slot) * 2.0f * learning_rate(options, state.next_iteration) /
-                           static_cast<float>(gradients.size());
-      adam_step(map.field, gradients, finest_level(state, map, options.iterations), adam);
-    }
-  });
-}
-
-// Mean radiance of every pixel over all caches but one.
-std::vector<vec3> mean_of_others(const std::vector<std::vector<vec3>>& radiance, size_t left_out) {
-  std::vector<vec3> mean(radiance[0].size(), vec3(0.0f));
-  for (size_t k = 0; k < radiance.size(); ++k) {
-    if (k == left_out) continue;
-    for (size_t i = 0; i < mean.size(); ++i)
-      mean[i] += radiance[k][i] / static_cast<float>(radiance.size() - 1);
+  for (size_t f = 0; f < state.fitted.size(); ++f) {
+    FittedMap& map = state.fitted[f];
+    if (progress + first_start < start_of(map.slot)) continue;
+    Image& gradient = d_delta[f];
+    const float change = prior_of(map.slot).change;
+    for (size_t i = 0; i < gradient.pixels.size(); ++i)
+      gradient.pixels[i] += change * map.field.delta.texels.pixels[i];
+    std::vector<Image> gradients = restrict_to_levels(map.field, gradient);
+    add_prior(map, gradients);
+    AdamOptions adam;
+    // Levels add up: with all of them in step, a texel moves at twice the rate that was asked for.
+    adam.learning_rate = rate_of(map.slot) * 2.0f * learning_rate(options, state.next_iteration) /
+                         static_cast<float>(gradients.size());
+    adam_step(map.field, gradients, finest_level(state, map, options.iterations), adam);
   }
-  return mean;
 }
 
-float psnr_of(const LightCache& cache, std::span<const FittedMap> fitted, const render::Scene& scene,
-              std::span<const Image> edited, float gain) {
-  const std::vector<vec3> radiance = shade_pixels(cache, fitted, scene.bsdf_model());
+// Radiance of every pixel in all caches but one.
+std::vector<std::span<const vec3>> all_but(const std::vector<std::vector<vec3>>& radiance, size_t left_out) {
+  std::vector<std::span<const vec3>> others;
+  for (size_t k = 0; k < radiance.size(); ++k)
+    if (k != left_out) others.push_back(radiance[k]);
+  return others;
+}
+
+float psnr_of(const LightCache& cache, std::span<const vec3> radiance, std::span<const Image> edited,
+              float gain) {
   double error = 0;
   for (size_t i = 0; i < radiance.size(); ++i) {
     const CachePixel& pixel = cache.pixels[i];
@@ -298,30 +300,31 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
   if (hooks.resume) restore_checkpoint(state, *hooks.resume);
 
-  const auto trace_cache = [&](uint32_t generation) {
-    scene.set_asset_materials(apply_changes(base, state.fitted));
+  Evaluator evaluator(state.fitted, model, gain);
+  const std::vector<asset::MaterialMaps> coarse_base = shrunk(base, state.fitted);
+  const auto trace = [&](LightCache& cache, int generation) {
+    scene.set_asset_materials(apply_changes(coarse_base, state.fitted, Padding::kNone));
     CacheOptions cache_options;
     cache_options.light_samples = options.light_samples;
     cache_options.max_depth = options.max_depth;
     cache_options.seed = options.seed;
-    cache_options.generation = generation;
-    return build_cache(scene, views, pixels, base, cache_options, progress);
+    cache_options.generation = static_cast<uint32_t>(generation);
+    cache.pixels = pixels;
+    trace_cache(cache, scene, views, base, cache_options, progress);
   };
   // Generation g lives in caches[g % kCaches]; the first kCaches are traced at the start, then one every
   // `interval` iterations.
   const int interval = std::max(1, (options.iterations + kRefreshes) / (kRefreshes + 1));
   std::array<LightCache, kCaches> caches;
   const auto renew = [&](int generation) {
-    const auto at = static_cast<size_t>(generation % kCaches);
-    caches[at] = {};  // the old one's memory serves the new one
-    caches[at] = trace_cache(static_cast<uint32_t>(generation));
+    trace(caches[static_cast<size_t>(generation % kCaches)], generation);
   };
   const bool has_work = !state.fitted.empty() && state.next_iteration < options.iterations;
   if (has_work && state.next_iteration == 0) {
     for (int generation = 0; generation < kCaches; ++generation) {
       renew(generation);
       const auto at = static_cast<size_t>(generation);
-      state.cache_radiance[at] = shade_pixels(caches[at], state.fitted, model);
+      state.cache_radiance[at] = evaluator.shade_pixels(caches[at]);
     }
   } else if (has_work) {
     // Resumed: each cache was traced with the parameters of its own beginning.
@@ -345,11 +348,9 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
       state.cache_parameters[turn] = parameters_of(state.fitted);
       renew(generation);
     }
-    Evaluation evaluation =
-        evaluate(caches[turn], mean_of_others(state.cache_radiance, turn), state.fitted, model, gain);
-    state.cache_radiance[turn] = std::move(evaluation.radiance);
-    step(state, evaluation, options);
-    state.loss.push_back(evaluation.loss);
+    state.loss.push_back(
+        evaluator.evaluate(caches[turn], all_but(state.cache_radiance, turn), state.cache_radiance[turn]));
+    step(state, evaluator.d_delta(), options);
     ++state.next_iteration;
     if (state.next_iteration == options.iterations * 3 / 4)
       state.late_parameters = parameters_of(state.fitted);
@@ -368,24 +369,25 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   // A cache that no iteration saw judges the end, and the result.
   FitResult result;
   if (!state.fitted.empty()) {
-    caches = {};
-    const LightCache cache = trace_cache(kCaches + kRefreshes + 1),
-                     other = trace_cache(kCaches + kRefreshes + 2);
+    LightCache &cache = caches[0], &other = caches[1];
+    trace(cache, kCaches + kRefreshes + 1);
+    trace(other, kCaches + kRefreshes + 2);
     // Losses of different caches differ by more than the last iterations win, so all candidates meet the same
     // one.
     Parameters best;
     float best_loss = std::numeric_limits<float>::infinity();
+    std::vector<vec3> radiance;
     for (const Parameters& candidate : {parameters_of(state.fitted), state.late_parameters, untouched}) {
       set_parameters(state.fitted, candidate);
-      const float loss =
-          evaluate(cache, shade_pixels(other, state.fitted, model), state.fitted, model, gain).loss;
+      const std::vector<vec3> of_other = evaluator.shade_pixels(other);
+      const float loss = evaluator.evaluate(cache, std::vector<std::span<const vec3>>{of_other}, radiance);
       if (loss < best_loss) best = candidate, best_loss = loss;
     }
     set_parameters(state.fitted, best);
-    result.psnr = psnr_of(cache, state.fitted, scene, edited, gain);
+    result.psnr = psnr_of(cache, evaluator.shade_pixels(cache), edited, gain);
   }
   result.loss = std::move(state.loss);
-  result.maps = apply_changes(base, state.fitted);
+  result.maps = apply_changes(base, state.fitted, Padding::kIslands);
   scene.set_asset_materials(result.maps);
   result.changed.resize(static_cast<size_t>(num_materials));
   result.evidence.resize(static_cast<size_t>(num_materials));

@@ -64,11 +64,11 @@ Range slot_range(Slot slot) {
 }
 
 std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::MaterialMaps>& base,
-                                               std::span<const FittedMap> fitted) {
+                                               std::span<const FittedMap> fitted, Padding padding) {
   std::vector<asset::MaterialMaps> maps = base;
   for (const FittedMap& map : fitted) {
     asset::Map change = map.field.delta;
-    change.texels = dilated(change, map.evidence, kPaddingTexels);
+    if (padding == Padding::kIslands) change.texels = dilated(change, map.evidence, kPaddingTexels);
     for (size_t i = 0; i < map.may_change.pixels.size(); ++i)
       if (map.may_change.pixels[i] <= 0.0f)
         std::fill_n(change.texels.pixels.begin() + static_cast<std::ptrdiff_t>(i) * change.texels.channels,
@@ -95,6 +95,17 @@ std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::Material
         }
       }
     });
+  }
+  return maps;
+}
+
+std::vector<asset::MaterialMaps> shrunk(const std::vector<asset::MaterialMaps>& base,
+                                        std::span<const FittedMap> fitted) {
+  std::vector<asset::MaterialMaps> maps = base;
+  for (const FittedMap& fitted_map : fitted) {
+    asset::Map& map = slot_map(maps[static_cast<size_t>(fitted_map.material)], fitted_map.slot);
+    const Image& size = fitted_map.field.delta.texels;
+    map = asset::resized(map, size.width, size.height);
   }
   return maps;
 }

@@ -44,10 +44,17 @@ inline float d_value_d_stored(Slot slot, float stored) {
   return slot == Slot::kBaseColor ? 2.0f * stored : 1.0f;
 }
 
-/// `maps` with every fitted map's change added to `base`, clamped, normals renormalised. Texels that must not
-/// change keep base's exact value.
+/// `base` with every fitted map's change added, clamped, normals renormalised. Texels that must not change
+/// keep base's exact value. kIslands: the change goes on beyond the texels that the views saw, so that no mip
+/// level shows a seam; between iterations nobody looks there.
+enum class Padding { kNone, kIslands };
 std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::MaterialMaps>& base,
-                                               std::span<const FittedMap> fitted);
+                                               std::span<const FittedMap> fitted, Padding padding);
+
+/// `base` with every fitted map at the size of its field: about a texel a pixel, enough for the light that
+/// surfaces throw on each other.
+std::vector<asset::MaterialMaps> shrunk(const std::vector<asset::MaterialMaps>& base,
+                                        std::span<const FittedMap> fitted);
 
 /// Parameters only: [map][level].
 using Parameters = std::vector<std::vector<Image>>;

@@ -7,6 +7,7 @@
 
 #include "patina/base/check.h"
 #include "patina/render/lights.h"
+#include "patina/render/microfacet.h"
 #include "patina/render/path_tracer.h"
 #include "patina/render/sampling.h"
 
@@ -16,6 +17,8 @@ namespace {
 // The wide lobe keeps the density above zero where the narrow one is, should the fit make the surface
 // rougher.
 constexpr float kWideRoughness = 0.5f;
+
+constexpr int kMaxLights = 8;
 
 enum Strategy { kLights, kCosine, kNarrow, kWide, kNumStrategies };
 
@@ -66,117 +69,136 @@ struct Frame {
   vec3 to_world(const vec3& v) const { return x * v.x + y * v.y + z * v.z; }
 };
 
-render::BsdfParams mirror_lobe(float roughness) {
-  return {vec3(1.0f), roughness, 1.0f};
-}
-
 }  // namespace
 
-int num_entries(const render::Scene& scene, const GatherOptions& options) {
+LightGatherer::LightGatherer(const render::Scene& scene, const GatherOptions& options)
+    : scene_(scene), options_(options), aims_(static_cast<size_t>(options.num_directions)) {
+  directions_.resize(aims_.size());
+}
+
+int LightGatherer::num_entries(const render::Scene& scene, const GatherOptions& options) {
   return options.num_directions + std::min(kMaxLights, static_cast<int>(scene.lights().size()));
 }
 
-void gather_light(const render::Scene& scene, const render::SurfacePoint& surface, const vec3& wo_world,
-                  const GatherOptions& options, RandomStream& random, std::span<IncidentLight> entries) {
-  PATINA_CHECK_EQ(static_cast<int>(entries.size()), num_entries(scene, options));
+void LightGatherer::gather(const render::SurfacePoint& surface, const vec3& wo, RandomStream& random,
+                           std::span<IncidentLight> entries) {
+  PATINA_CHECK_EQ(static_cast<int>(entries.size()), num_entries(scene_, options_));
   std::fill(entries.begin(), entries.end(), IncidentLight{surface.n_interpolated, vec3(0.0f)});
-  size_t next = 0;
+  const size_t num_punctual = entries.size() - aims_.size();
+  gather_punctual(surface, random, entries.first(num_punctual));
+  entries = entries.subspan(num_punctual);
 
-  // Punctual lights: all of them, or kMaxLights spread evenly with one random offset.
-  const std::span<const asset::Light> punctual = scene.lights();
-  const size_t num_punctual = std::min<size_t>(kMaxLights, punctual.size());
-  if (num_punctual > 0) {
-    const float stride = static_cast<float>(punctual.size()) / static_cast<float>(num_punctual);
-    const float offset = punctual.size() > num_punctual ? random.uniform() : 0.0f;
-    for (size_t i = 0; i < num_punctual; ++i) {
-      const auto chosen =
-          std::min(static_cast<size_t>((static_cast<float>(i) + offset) * stride), punctual.size() - 1);
-      const asset::Light& light = punctual[chosen];
-      const render::PunctualArrival arrival = render::punctual_arrival(light, surface.p_world);
-      IncidentLight& entry = entries[next++];
-      if (!(glm::dot(arrival.direction, surface.n_geometric) > 0.0f &&
-            max_component(arrival.irradiance) > 0.0f))
-        continue;
-      const render::Ray shadow = light.kind == asset::LightKind::kDirectional
-                                     ? render::spawn_ray(surface, arrival.direction)
-                                     : render::spawn_segment(surface, light.p_world);
-      if (!scene.occluded(shadow, random.uniform())) entry = {arrival.direction, arrival.irradiance * stride};
-    }
-  }
-
-  const render::Lights& lights = scene.light_sampler();
-  const auto counts = shares(options.num_directions, lights.has_extended(), surface.bsdf.metallic);
+  // Choose all directions.
+  const render::Lights& lights = scene_.light_sampler();
+  const auto counts = shares(options_.num_directions, lights.has_extended(), surface.bsdf.metallic);
   const Frame frame(surface.n_shading);
-  const vec3 wo = frame.to_local(wo_world);
-  const render::BsdfParams narrow = mirror_lobe(surface.bsdf.roughness);
-  const render::BsdfParams wide = mirror_lobe(kWideRoughness);
-
+  const vec3 wo_local = frame.to_local(wo);
+  LobeMixture mixture;
+  mixture.n = surface.n_shading;
+  mixture.wo = wo;
+  mixture.num_cosine = static_cast<float>(counts[kCosine]);
+  mixture.num_narrow = static_cast<float>(counts[kNarrow]);
+  mixture.num_wide = static_cast<float>(counts[kWide]);
+  mixture.alpha_narrow = render::alpha_from_roughness(surface.bsdf.roughness);
+  mixture.alpha_wide = render::alpha_from_roughness(kWideRoughness);
+  size_t next = 0;
   for (int strategy = 0; strategy < kNumStrategies; ++strategy) {
     const int count = counts[static_cast<size_t>(strategy)];
     const vec2 shift = random.uniform2();
-    for (int i = 0; i < count; ++i) {
-      IncidentLight& entry = entries[next++];
-      // Three numbers a direction: a shifted Hammersley point, and which light or lobe it is for.
+    for (int i = 0; i < count; ++i, ++next) {
+      // A shifted Hammersley point.
       const vec2 u = shifted(vec2((static_cast<float>(i) + 0.5f) / static_cast<float>(count),
                                   radical_inverse(static_cast<uint32_t>(i))),
                              shift);
-      const float u_choice = (static_cast<float>(i) + random.uniform()) / static_cast<float>(count);
-      vec3 wi(0.0f);
-      float aimed_distance = 0.0f;  // of the emitter that the direction was made for
+      Aim& aim = aims_[next];
+      aim = {};
+      vec3 wi = surface.n_interpolated;
       if (strategy == kLights) {
-        const auto light = lights.sample_extended(surface.p_world, u_choice, u);
-        if (!light) continue;
-        wi = light->direction;
-        if (!light->at_infinity) aimed_distance = glm::length(light->p_light - surface.p_world);
+        const float u_light = (static_cast<float>(i) + random.uniform()) / static_cast<float>(count);
+        if (const auto light = lights.sample_extended(surface.p_world, u_light, u)) {
+          wi = light->direction;
+          aim.valid = true;
+          aim.from_environment = light->at_infinity;
+          aim.arrival = {light->radiance, light->pdf};
+          if (!light->at_infinity) aim.distance = glm::length(light->p_light - surface.p_world);
+        }
       } else if (strategy == kCosine) {
         wi = frame.to_world(render::sample_cosine_hemisphere(u));
-      } else {
-        const auto sample = render::sample_bsdf(render::BsdfModel::kGltf, strategy == kNarrow ? narrow : wide,
-                                                wo, u_choice, u);
-        if (!(sample.pdf > 0.0f)) continue;
-        wi = frame.to_world(sample.wi);
+        aim.valid = true;
+      } else if (wo_local.z > 0.0f) {
+        const vec3 h = render::sample_visible_normal(
+            strategy == kNarrow ? mixture.alpha_narrow : mixture.alpha_wide, wo_local, u);
+        wi = frame.to_world(2.0f * glm::dot(wo_local, h) * h - wo_local);
+        // A microfacet may reflect below the horizon: that light is what single scattering loses.
+        aim.valid = glm::dot(wi, surface.n_shading) > 0.0f;
       }
       // Light from below the true surface cannot arrive.
-      if (!(glm::dot(wi, surface.n_geometric) > 0.0f)) continue;
-
-      const render::Ray ray = render::spawn_ray(surface, wi);
-      const std::optional<render::Hit> hit =
-          scene.intersect(ray, 0.0f);  // any surface that is not wholly transparent
-      // Aiming at an emitter makes a direction only if the emitter is what the direction meets first. So the
-      // strategy has no density along blocked directions, and the mixture stays exact.
-      if (aimed_distance > 0.0f && !(hit && std::abs(hit->t - aimed_distance) < 1e-3f * aimed_distance))
-        continue;
-
-      const vec3 wi_local = frame.to_local(wi);
-      float density = static_cast<float>(counts[kCosine]) * std::max(wi_local.z, 0.0f) * kInvPi;
-      density += static_cast<float>(counts[kNarrow]) *
-                 render::pdf_bsdf(render::BsdfModel::kGltf, narrow, wo, wi_local);
-      density +=
-          static_cast<float>(counts[kWide]) * render::pdf_bsdf(render::BsdfModel::kGltf, wide, wo, wi_local);
-      if (counts[kLights] > 0) {
-        float light_density = lights.pdf_environment(wi);
-        if (hit) {
-          const render::SurfacePoint met = scene.surface(ray, *hit);
-          light_density += lights.pdf_triangle(hit->primitive, hit->triangle, wi, hit->t, met.n_geometric);
-        }
-        density += static_cast<float>(counts[kLights]) * light_density;
-      }
-      if (!(density > 0.0f)) continue;
-
-      // Nothing in the way is the common case; else a path decides whether blended surfaces are met or
-      // passed.
-      vec3 radiance = scene.environment().radiance(wi);
-      if (hit) {
-        render::PathOptions path;
-        path.max_depth = options.max_depth - 1;
-        path.show_environment = true;
-        radiance = render::trace_path(scene, ray, path, random);
-      }
-      const vec3 weighted = radiance / density;
-      if (is_finite(weighted)) entry = {wi, weighted};
+      aim.valid = aim.valid && glm::dot(wi, surface.n_geometric) > 0.0f;
+      directions_.set(next, wi);
     }
   }
   PATINA_CHECK_EQ(next, entries.size());
+  lobe_densities(mixture, directions_, density_);
+
+  // Cast the rays.
+  const auto num_lights = static_cast<float>(counts[kLights]);
+  for (size_t i = 0; i < aims_.size(); ++i) {
+    const Aim& aim = aims_[i];
+    if (!aim.valid) continue;
+    const vec3 wi = directions_[i];
+    const render::Ray ray = render::spawn_ray(surface, wi);
+    // Any surface that is not wholly transparent.
+    const std::optional<render::Hit> hit = scene_.intersect(ray, 0.0f);
+    // Aiming at an emitter makes a direction only if the emitter is what the direction meets first. So the
+    // strategy has no density along blocked directions, and the mixture stays exact.
+    if (aim.distance > 0.0f && !(hit && std::abs(hit->t - aim.distance) < 1e-3f * aim.distance)) continue;
+
+    const render::Environment::Arrival arrival =
+        aim.from_environment ? aim.arrival : lights.arrival_from_environment(wi);
+    float density = density_[i] + num_lights * arrival.pdf;
+    if (hit && lights.has_emitters()) {
+      const render::SurfacePoint met = scene_.surface(ray, *hit);
+      density += num_lights * lights.pdf_triangle(hit->primitive, hit->triangle, wi, hit->t, met.n_geometric);
+    }
+    if (!(density > 0.0f)) continue;
+    const vec3 weighted = (hit ? radiance_of_hit(ray, *hit, random) : arrival.radiance) / density;
+    if (is_finite(weighted)) entries[i] = {wi, weighted};
+  }
+}
+
+// All punctual lights, or kMaxLights spread evenly with one random offset.
+void LightGatherer::gather_punctual(const render::SurfacePoint& surface, RandomStream& random,
+                                    std::span<IncidentLight> entries) const {
+  if (entries.empty()) return;
+  const std::span<const asset::Light> punctual = scene_.lights();
+  const float stride = static_cast<float>(punctual.size()) / static_cast<float>(entries.size());
+  const float offset = punctual.size() > entries.size() ? random.uniform() : 0.0f;
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const auto chosen =
+        std::min(static_cast<size_t>((static_cast<float>(i) + offset) * stride), punctual.size() - 1);
+    const asset::Light& light = punctual[chosen];
+    const render::PunctualArrival arrival = render::punctual_arrival(light, surface.p_world);
+    if (!(glm::dot(arrival.direction, surface.n_geometric) > 0.0f &&
+          max_component(arrival.irradiance) > 0.0f))
+      continue;
+    const render::Ray shadow = light.kind == asset::LightKind::kDirectional
+                                   ? render::spawn_ray(surface, arrival.direction)
+                                   : render::spawn_segment(surface, light.p_world);
+    if (!scene_.occluded(shadow, random.uniform()))
+      entries[i] = {arrival.direction, arrival.irradiance * stride};
+  }
+}
+
+// What a surface sends back along the ray that met it.
+vec3 LightGatherer::radiance_of_hit(const render::Ray& ray, const render::Hit& hit,
+                                    RandomStream& random) const {
+  render::PathOptions path;
+  path.max_depth = options_.max_depth - 1;
+  path.roulette_depth = 1;  // one direction of many: a short path tells enough
+  path.show_environment = true;
+  // A path decides anew whether blended surfaces are met or passed.
+  return scene_.has_blended() ? render::trace_path(scene_, ray, path, random)
+                              : render::trace_path_from(scene_, ray, hit, path, random);
 }
 
 }  // namespace patina::inverse

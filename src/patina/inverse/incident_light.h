@@ -5,8 +5,10 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "patina/base/random.h"
+#include "patina/inverse/lobe_density.h"
 #include "patina/render/scene.h"
 
 namespace patina::inverse {
@@ -23,14 +25,38 @@ struct GatherOptions {
   int max_depth = 4;  // path segments after the camera ray, as render::PathOptions counts them
 };
 
-/// Number of entries that gather_light fills: directions and punctual lights (at most kMaxLights of them,
-/// chosen evenly).
-inline constexpr int kMaxLights = 8;
-int num_entries(const render::Scene& scene, const GatherOptions& options);
+/// Gathers the light at one point after the other; keeps what all points share. One a thread.
+class LightGatherer {
+ public:
+  LightGatherer(const render::Scene& scene, const GatherOptions& options);
 
-/// Fills `entries` (num_entries of them; unused ones carry no light) for a viewer in direction `wo`. The
-/// material at `surface` places the narrow lobe and decides how the directions are shared out, nothing else.
-void gather_light(const render::Scene& scene, const render::SurfacePoint& surface, const vec3& wo,
-                  const GatherOptions& options, RandomStream& random, std::span<IncidentLight> entries);
+  /// Entries that `gather` fills: directions and punctual lights (at most eight of them, chosen evenly).
+  static int num_entries(const render::Scene& scene, const GatherOptions& options);
+
+  /// Fills `entries` (num_entries of them; unused ones carry no light) for a viewer in direction `wo`. The
+  /// material at `surface` places the narrow lobe and decides how the directions are shared out, nothing
+  /// else.
+  void gather(const render::SurfacePoint& surface, const vec3& wo, RandomStream& random,
+              std::span<IncidentLight> entries);
+
+ private:
+  // What is known of a direction before its ray is cast.
+  struct Aim {
+    bool valid = false;
+    bool from_environment = false;           // chosen by the environment's sampler,
+    render::Environment::Arrival arrival{};  // which said this
+    float distance = 0;                      // of the emitter that the direction was made for
+  };
+
+  void gather_punctual(const render::SurfacePoint& surface, RandomStream& random,
+                       std::span<IncidentLight> entries) const;
+  vec3 radiance_of_hit(const render::Ray& ray, const render::Hit& hit, RandomStream& random) const;
+
+  const render::Scene& scene_;
+  GatherOptions options_;
+  std::vector<Aim> aims_;
+  DirectionArrays directions_;
+  std::vector<float> density_;
+};
 
 }  // namespace patina::inverse

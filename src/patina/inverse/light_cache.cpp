@@ -40,19 +40,18 @@ std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<con
   return pixels;
 }
 
-LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
-                       std::vector<CachePixel> pixels, const std::vector<asset::MaterialMaps>& base_maps,
-                       const CacheOptions& options, const Progress& progress) {
+void trace_cache(LightCache& cache, const render::Scene& scene, const views::ViewSet& views,
+                 const std::vector<asset::MaterialMaps>& base_maps, const CacheOptions& options,
+                 const Progress& progress) {
   const GatherOptions gather{std::max(1, options.light_samples), options.max_depth};
-  LightCache cache;
-  cache.pixels = std::move(pixels);
-  cache.lights_per_pixel = num_entries(scene, gather);
+  cache.lights_per_pixel = LightGatherer::num_entries(scene, gather);
   cache.samples.resize(cache.pixels.size());
   cache.lights.resize(cache.pixels.size() * static_cast<size_t>(cache.lights_per_pixel));
 
   constexpr int64_t kPixelsPerTask = 64;
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
     progress.throw_if_stopped();
+    LightGatherer gatherer(scene, gather);
     std::vector<IncidentLight> lights(static_cast<size_t>(cache.lights_per_pixel));
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       const CachePixel& pixel = cache.pixels[i];
@@ -63,22 +62,21 @@ LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
       RandomStream random(options.seed, RandomPurpose::kLightCache, index, 1 + options.generation);
       const render::Ray ray = camera.ray(vec2(pixel.x, pixel.y) + jitter(shift, options.generation));
       const auto hit = scene.intersect(ray, random.uniform());
+      CacheSample& sample = cache.samples[i];
+      sample.hit = hit.has_value();
       if (!hit) continue;
       const render::SurfacePoint surface = scene.surface(ray, *hit);
       const auto material = static_cast<size_t>(surface.material);
       const bool is_context = material >= base_maps.size();
-      CacheSample& sample = cache.samples[i];
       sample.point = material_point(surface, -ray.direction, scene.materials()[material]);
       sample.base = sample_maps(is_context ? scene.materials()[material] : base_maps[material], sample.point);
       sample.emission = surface.emission;
-      sample.hit = true;
-      gather_light(scene, surface, -ray.direction, gather, random, lights);
+      gatherer.gather(surface, -ray.direction, random, lights);
       PackedLight* packed = cache.lights.data() + i * lights.size();
       for (const IncidentLight& light : lights)
         *packed++ = {pack_direction(light.wi), pack_radiance(light.weighted_radiance)};
     }
   });
-  return cache;
 }
 
 }  // namespace patina::inverse

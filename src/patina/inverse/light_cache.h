@@ -61,10 +61,11 @@ struct CacheOptions {
 std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<const Image> targets,
                                       std::span<const Image> weights);
 
-/// Traces the cache. Directions follow the scene's current materials, and so does the light that other
-/// surfaces reflect; `base_maps` are the asset's starting maps from which CacheSample::base is read.
-LightCache build_cache(const render::Scene& scene, const views::ViewSet& views,
-                       std::vector<CachePixel> pixels, const std::vector<asset::MaterialMaps>& base_maps,
-                       const CacheOptions& options, const Progress& progress);
+/// Traces samples and lights of `cache`, whose pixels are given; memory that it holds is used again.
+/// Directions follow the scene's current materials, and so does the light that other surfaces reflect;
+/// `base_maps` are the asset's starting maps from which CacheSample::base is read.
+void trace_cache(LightCache& cache, const render::Scene& scene, const views::ViewSet& views,
+                 const std::vector<asset::MaterialMaps>& base_maps, const CacheOptions& options,
+                 const Progress& progress);
 
 }  // namespace patina::inverse

@@ -2,29 +2,43 @@
 // vectorised. Sums stay the same from run to run on one machine.
 #include "patina/inverse/shade.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 
-#include "patina/base/check.h"
+#include "patina/base/vector_clones.h"
 #include "patina/inverse/light_packing.h"
 #include "patina/render/microfacet.h"
 
 namespace patina::inverse {
 namespace {
 
-// Lights are taken in blocks of this many: their terms stay in the first-level cache (16 arrays × 64 floats
-// are 4 KB).
-constexpr size_t kBlock = 32;
 constexpr float kDielectricF0 = 0.04f;
 
-// Per light of a block, with S = (1 − wo·h)⁵, F = 0.04 + 0.96 S, m metallic, c base colour [glTF2, App. B.2]:
-//   value = c · a + b,   a = (1−m)(1−F) diffuse + m (1−S) specular,   b = specular · ((1−m) F + m S)
-struct Block {
-  alignas(32) float wi_x[kBlock], wi_y[kBlock], wi_z[kBlock];
-  alignas(32) float light_r[kBlock], light_g[kBlock], light_b[kBlock];
-  alignas(32) float diffuse[kBlock], specular[kBlock], schlick[kBlock];
-  alignas(32) float n_h[kBlock], base[kBlock], inverse_h[kBlock], root_i[kBlock], n_i[kBlock];
+// Lights are taken in steps of a vector's width; the last step is filled up with lights of no radiance.
+constexpr size_t kWidth = 16;
+
+// What value and gradient share: of each step of lights an array a term. With S = (1 − wo·h)⁵, F = 0.04 +
+// 0.96 S, m metallic, c base colour [glTF2, App. B.2] a light adds
+//   c · a + b,   a = (1−m)(1−F) diffuse + m (1−S) specular,   b = specular · ((1−m) F + m S).
+enum Term : size_t {
+  kWiX,
+  kWiY,
+  kWiZ,  // direction
+  kLightR,
+  kLightG,
+  kLightB,  // weighted radiance
+  kDiffuse,
+  kSpecular,
+  kSchlick,
+  kNormalI,       // n·wi
+  kNormalH,       // n·h
+  kInverseH,      // 1 / |wo + wi|
+  kInverseBase,   // 1 / (sin²θh + α² cos²θh)
+  kInverseRootI,  // 1 / √(α² + (1−α²)(n·wi)²)
+  kVisibilityI,   // Smith's masking of wi, over 2 n·wi
+  kNumTerms
 };
+constexpr size_t kStepSize = kNumTerms * kWidth;
 
 struct PointTerms {
   vec3 n, wo;
@@ -42,50 +56,55 @@ PointTerms point_terms(const CacheSample& sample, const Shading& shading) {
   return t;
 }
 
-// Unpacks a block and computes the terms of every light; lights below the shading normal get none.
-void fill(Block& block, const PackedLight* lights, size_t count, const PointTerms& t) {
-  for (size_t k = 0; k < count; ++k) {
+// Terms of a step's lights; those below the shading normal get none. One pointer and fixed distances: the
+// compiler must see that no array overlaps another.
+inline __attribute__((always_inline)) void fill_step(const PackedLight* lights, const PointTerms& t, float* step) {
+  const float nx = t.n.x, ny = t.n.y, nz = t.n.z, ox = t.wo.x, oy = t.wo.y, oz = t.wo.z;
+  const float alpha2 = t.alpha2, one_minus_alpha2 = 1.0f - t.alpha2;
+  const float specular_scale = alpha2 * kInvPi * t.visibility_o;
+  for (size_t k = 0; k < kWidth; ++k) {
+    // As unpack_direction and unpack_radiance do.
     const uint32_t d = lights[k].direction;
     const float px = static_cast<float>(static_cast<int>(d & 0xFFFFu) - 32767) * (1.0f / 32767.0f);
     const float py = static_cast<float>(static_cast<int>(d >> 16) - 32767) * (1.0f / 32767.0f);
     const float pz = 1.0f - std::abs(px) - std::abs(py);
     const float fold = pz < 0.0f ? -pz : 0.0f;
-    const float x = px < 0.0f ? px + fold : px - fold, y = py < 0.0f ? py + fold : py - fold;
-    const float inverse = 1.0f / std::sqrt(x * x + y * y + pz * pz);
-    block.wi_x[k] = x * inverse, block.wi_y[k] = y * inverse, block.wi_z[k] = pz * inverse;
-
+    const float ux = px < 0.0f ? px + fold : px - fold, uy = py < 0.0f ? py + fold : py - fold;
+    const float inverse = 1.0f / std::sqrt(ux * ux + uy * uy + pz * pz);
+    const float x = ux * inverse, y = uy * inverse, z = pz * inverse;
+    step[kWiX * kWidth + k] = x, step[kWiY * kWidth + k] = y, step[kWiZ * kWidth + k] = z;
     const uint32_t r = lights[k].radiance;
     // Zero packs to 0: its exponent field would wrap round, its mantissas make it zero anyway once the
     // exponent is bounded.
     const uint32_t exponent = (r >> 24) < 9u ? 9u : (r >> 24);
     const float scale = __builtin_bit_cast(float, (exponent - 8u) << 23);
-    block.light_r[k] = static_cast<float>(static_cast<int>(r & 0xFFu)) * scale;
-    block.light_g[k] = static_cast<float>(static_cast<int>(r >> 8 & 0xFFu)) * scale;
-    block.light_b[k] = static_cast<float>(static_cast<int>(r >> 16 & 0xFFu)) * scale;
-  }
-  for (size_t k = 0; k < count; ++k) {
-    const float wx = block.wi_x[k], wy = block.wi_y[k], wz = block.wi_z[k];
-    const float n_i = t.n.x * wx + t.n.y * wy + t.n.z * wz;
-    const float hx = t.wo.x + wx, hy = t.wo.y + wy, hz = t.wo.z + wz;
+    step[kLightR * kWidth + k] = static_cast<float>(static_cast<int>(r & 0xFFu)) * scale;
+    step[kLightG * kWidth + k] = static_cast<float>(static_cast<int>(r >> 8 & 0xFFu)) * scale;
+    step[kLightB * kWidth + k] = static_cast<float>(static_cast<int>(r >> 16 & 0xFFu)) * scale;
+
+    const float n_i = nx * x + ny * y + nz * z;
+    const float hx = ox + x, hy = oy + y, hz = oz + z;
     // Opposite directions have no half vector; they are below the surface for one of the two.
-    const float inverse_h = 1.0f / std::sqrt(std::max(hx * hx + hy * hy + hz * hz, 1e-12f));
-    const float n_h = (t.n.x * hx + t.n.y * hy + t.n.z * hz) * inverse_h;
-    const float cx = (t.n.y * hz - t.n.z * hy) * inverse_h, cy = (t.n.z * hx - t.n.x * hz) * inverse_h,
-                cz = (t.n.x * hy - t.n.y * hx) * inverse_h;
-    const float base = cx * cx + cy * cy + cz * cz + t.alpha2 * n_h * n_h;
-    const float lit = n_i > 0.0f ? 1.0f : 0.0f;
-    const float root_i = std::sqrt(t.alpha2 + (1.0f - t.alpha2) * n_i * n_i);
-    const float o_h = (t.wo.x * hx + t.wo.y * hy + t.wo.z * hz) * inverse_h;
-    const float m = std::max(1.0f - o_h, 0.0f);
-    block.n_i[k] = n_i;
-    block.n_h[k] = n_h;
-    block.inverse_h[k] = inverse_h;
-    block.base[k] = base;
-    block.root_i[k] = root_i;
-    block.schlick[k] = m * m * m * m * m;
-    block.diffuse[k] = lit * n_i * kInvPi;
-    block.specular[k] =
-        lit * t.alpha2 / (kPi * base * base) * t.visibility_o * n_i / (std::abs(n_i) + root_i);
+    const float length2_h = hx * hx + hy * hy + hz * hz;
+    const float inverse_h = 1.0f / std::sqrt(length2_h > 1e-12f ? length2_h : 1e-12f);
+    const float n_h = (nx * hx + ny * hy + nz * hz) * inverse_h;
+    const float cx = ny * hz - nz * hy, cy = nz * hx - nx * hz, cz = nx * hy - ny * hx;
+    // At least α² for unit vectors; without a half vector it would be nothing.
+    const float base = (cx * cx + cy * cy + cz * cz) * inverse_h * inverse_h + alpha2 * n_h * n_h;
+    const float one_over_base = 1.0f / (base > 1e-7f ? base : 1e-7f);
+    const float lit = n_i > 0.0f ? n_i : 0.0f;
+    const float one_over_root = 1.0f / std::sqrt(alpha2 + one_minus_alpha2 * n_i * n_i);
+    const float root_i = (alpha2 + one_minus_alpha2 * n_i * n_i) * one_over_root;
+    const float masking = 1.0f / (std::abs(n_i) + root_i);
+    const float o_h = (ox * hx + oy * hy + oz * hz) * inverse_h;
+    const float m = 1.0f - o_h > 0.0f ? 1.0f - o_h : 0.0f;
+    step[kNormalI * kWidth + k] = n_i, step[kNormalH * kWidth + k] = n_h,
+                             step[kInverseH * kWidth + k] = inverse_h;
+    step[kInverseBase * kWidth + k] = one_over_base, step[kInverseRootI * kWidth + k] = one_over_root,
+                                 step[kVisibilityI * kWidth + k] = masking;
+    step[kSchlick * kWidth + k] = m * m * m * m * m;
+    step[kDiffuse * kWidth + k] = lit * kInvPi;
+    step[kSpecular * kWidth + k] = specular_scale * one_over_base * one_over_base * lit * masking;
   }
 }
 
@@ -93,18 +112,101 @@ struct Sums {
   vec3 a{0.0f};  // Σ a · light: derivative with respect to base colour
   vec3 b{0.0f};  // Σ b · light
 };
-Sums sum_values(const Block& block, size_t count, float metallic) {
-  float ar = 0, ag = 0, ab = 0, br = 0, bg = 0, bb = 0;
-  for (size_t k = 0; k < count; ++k) {
-    const float s = block.schlick[k];
-    const float fresnel = kDielectricF0 + (1.0f - kDielectricF0) * s;
-    const float a =
-        (1.0f - metallic) * (1.0f - fresnel) * block.diffuse[k] + metallic * (1.0f - s) * block.specular[k];
-    const float b = block.specular[k] * ((1.0f - metallic) * fresnel + metallic * s);
-    ar += a * block.light_r[k], ag += a * block.light_g[k], ab += a * block.light_b[k];
-    br += b * block.light_r[k], bg += b * block.light_g[k], bb += b * block.light_b[k];
+
+// A sum over lights, one partial sum a place in the vector.
+struct Lanes {
+  alignas(64) float sum[kWidth] = {};
+  float total() const {
+    float total = 0;
+    for (size_t k = 0; k < kWidth; ++k) total += sum[k];
+    return total;
   }
-  return {vec3(ar, ag, ab), vec3(br, bg, bb)};
+};
+
+// Fills the terms of all lights, kStepSize floats a step, and sums what they reflect.
+PATINA_VECTOR_CLONES
+Sums sum_values(const PackedLight* lights, size_t count, const PointTerms& t, float metallic, float* terms) {
+  Lanes ar, ag, ab, br, bg, bb;
+  for (size_t first = 0; first < count; first += kWidth, terms += kStepSize) {
+    if (first + kWidth <= count) {
+      fill_step(lights + first, t, terms);
+    } else {
+      PackedLight last[kWidth] = {};
+      std::copy(lights + first, lights + count, last);
+      fill_step(last, t, terms);
+    }
+    const float* step = terms;
+    for (size_t k = 0; k < kWidth; ++k) {
+      const float s = step[kSchlick * kWidth + k], specular = step[kSpecular * kWidth + k];
+      const float fresnel = kDielectricF0 + (1.0f - kDielectricF0) * s;
+      const float a = (1.0f - metallic) * (1.0f - fresnel) * step[kDiffuse * kWidth + k] +
+                      metallic * (1.0f - s) * specular;
+      const float b = specular * ((1.0f - metallic) * fresnel + metallic * s);
+      const float red = step[kLightR * kWidth + k], green = step[kLightG * kWidth + k],
+                  blue = step[kLightB * kWidth + k];
+      ar.sum[k] += a * red, ag.sum[k] += a * green, ab.sum[k] += a * blue;
+      br.sum[k] += b * red, bg.sum[k] += b * green, bb.sum[k] += b * blue;
+    }
+  }
+  return {vec3(ar.total(), ag.total(), ab.total()), vec3(br.total(), bg.total(), bb.total())};
+}
+
+struct GradientSums {
+  float alpha = 0, metallic = 0;
+  float along_wo = 0;  // of the derivative by the normal
+  float along_x = 0, along_y = 0, along_z = 0;
+};
+
+PATINA_VECTOR_CLONES
+GradientSums sum_gradients(size_t num_lights, const PointTerms& t, float metallic, const vec3& g,
+                           const vec3& g_base, const float* terms) {
+  const float one_minus_alpha2 = 1.0f - t.alpha2;
+  // d V_o / d n = −V_o (1 + (1−α²) n·wo / root) wo, relative to V_o; and the same for the derivative by α.
+  const float normal_o = -t.visibility_o * (1.0f + one_minus_alpha2 * t.n_o / t.root_o);
+  const float alpha_o = -t.visibility_o * t.alpha * (1.0f - t.n_o * t.n_o) / t.root_o;
+  const float of_alpha = 2.0f / t.alpha + alpha_o, alpha = t.alpha, m = metallic;
+  const float gx = g.x, gy = g.y, gz = g.z, bx = g_base.x, by = g_base.y, bz = g_base.z;
+  Lanes d_alpha, d_metallic, along_wo, along_x, along_y, along_z;
+  for (size_t first = 0; first < num_lights; first += kWidth, terms += kStepSize) {
+    const float* step = terms;
+    for (size_t k = 0; k < kWidth; ++k) {
+      const float s = step[kSchlick * kWidth + k], specular = step[kSpecular * kWidth + k];
+      const float diffuse = step[kDiffuse * kWidth + k];
+      const float fresnel = kDielectricF0 + (1.0f - kDielectricF0) * s;
+      const float red = step[kLightR * kWidth + k], green = step[kLightG * kWidth + k],
+                  blue = step[kLightB * kWidth + k];
+      const float light = red * gx + green * gy + blue * gz;
+      const float light_base = red * bx + green * by + blue * bz;
+      d_metallic.sum[k] += light_base * ((1.0f - s) * specular - (1.0f - fresnel) * diffuse) +
+                           light * specular * (s - fresnel);
+
+      // What multiplies the specular and the diffuse lobe once channels are summed.
+      const float by_specular =
+          specular * (light_base * m * (1.0f - s) + light * ((1.0f - m) * fresnel + m * s));
+      const float n_i = step[kNormalI * kWidth + k], n_h = step[kNormalH * kWidth + k];
+      const float by_diffuse = light_base * (1.0f - m) * (1.0f - fresnel) * (n_i > 0.0f ? kInvPi : 0.0f);
+
+      const float visibility = step[kVisibilityI * kWidth + k],
+                  inverse_base = step[kInverseBase * kWidth + k];
+      const float masking = visibility * step[kInverseRootI * kWidth + k];
+      d_alpha.sum[k] += by_specular * (of_alpha - 4.0f * alpha * n_h * n_h * inverse_base -
+                                       masking * alpha * (1.0f - n_i * n_i));
+      // d ln(specular) / dn = 4 (n·h)(1−α²)/base · h + (masking terms) wo, wi + wi / n·wi, up to multiples of
+      // n, which the normalisation of the normal takes out again. h = (wo + wi) · inverse_h.
+      const float along_h =
+          by_specular * 4.0f * n_h * one_minus_alpha2 * inverse_base * step[kInverseH * kWidth + k];
+      const float safe_n_i = n_i > 1e-6f ? n_i : 1e-6f;
+      const float along_wi = along_h +
+                             by_specular * (1.0f / safe_n_i - visibility - masking * one_minus_alpha2 * n_i) +
+                             by_diffuse;
+      along_wo.sum[k] += along_h + by_specular * normal_o;
+      along_x.sum[k] += along_wi * step[kWiX * kWidth + k];
+      along_y.sum[k] += along_wi * step[kWiY * kWidth + k];
+      along_z.sum[k] += along_wi * step[kWiZ * kWidth + k];
+    }
+  }
+  return {d_alpha.total(), d_metallic.total(), along_wo.total(),
+          along_x.total(), along_y.total(),    along_z.total()};
 }
 
 bool sees_front(const PointTerms& t) {
@@ -113,81 +215,33 @@ bool sees_front(const PointTerms& t) {
 
 }  // namespace
 
-vec3 shade(render::BsdfModel model, const CacheSample& sample, const Shading& shading,
-           std::span<const PackedLight> lights) {
+vec3 Shader::shade(const CacheSample& sample, const Shading& shading, std::span<const PackedLight> lights) {
+  sample_ = &sample;
+  shading_ = &shading;
+  lights_ = lights;
   if (!sample.hit) return vec3(0.0f);
-  if (model != render::BsdfModel::kGltf)
-    return shade_reference(model, sample, shading, lights, vec3(0.0f)).radiance;
+  if (model_ != render::BsdfModel::kGltf)
+    return shade_reference(model_, sample, shading, lights, vec3(0.0f)).radiance;
   const PointTerms t = point_terms(sample, shading);
-  vec3 radiance = sample.emission;
-  if (!sees_front(t)) return radiance;
-  Block block;
-  for (size_t begin = 0; begin < lights.size(); begin += kBlock) {
-    const size_t count = std::min(kBlock, lights.size() - begin);
-    fill(block, lights.data() + begin, count, t);
-    const Sums sums = sum_values(block, count, shading.bsdf.metallic);
-    radiance += shading.bsdf.base_color * sums.a + sums.b;
-  }
-  return radiance;
+  if (!sees_front(t)) return sample.emission;
+  terms_.resize((lights.size() + kWidth - 1) / kWidth * kStepSize);
+  const Sums sums = sum_values(lights.data(), lights.size(), t, shading.bsdf.metallic, terms_.data());
+  sum_by_base_color_ = sums.a;
+  return sample.emission + shading.bsdf.base_color * sums.a + sums.b;
 }
 
-MapGradient shade_adjoint(render::BsdfModel model, const CacheSample& sample, const Shading& shading,
-                          std::span<const PackedLight> lights, const vec3& d_radiance) {
-  if (!sample.hit) return zero_gradient();
-  if (model != render::BsdfModel::kGltf)
-    return shade_reference(model, sample, shading, lights, d_radiance).gradient;
-  const PointTerms t = point_terms(sample, shading);
+MapGradient Shader::adjoint(const vec3& d_radiance) const {
+  if (!sample_->hit) return zero_gradient();
+  if (model_ != render::BsdfModel::kGltf)
+    return shade_reference(model_, *sample_, *shading_, lights_, d_radiance).gradient;
+  const PointTerms t = point_terms(*sample_, *shading_);
   if (!sees_front(t)) return zero_gradient();
-
-  const float m = shading.bsdf.metallic;
-  const vec3 g = d_radiance;
-  const vec3 g_base = d_radiance * shading.bsdf.base_color;
-  const float one_minus_alpha2 = 1.0f - t.alpha2;
-  // d V_o / d n = −V_o (1 + (1−α²) n·wo / root) wo, relative to V_o; and the same for the derivative by α.
-  const float normal_o = -t.visibility_o * (1.0f + one_minus_alpha2 * t.n_o / t.root_o);
-  const float alpha_o = -t.visibility_o * t.alpha * (1.0f - t.n_o * t.n_o) / t.root_o;
-
-  vec3 d_base_color(0.0f);
-  float d_alpha = 0, d_metallic = 0, along_wo = 0, along_x = 0, along_y = 0, along_z = 0;
-  Block block;
-  for (size_t begin = 0; begin < lights.size(); begin += kBlock) {
-    const size_t count = std::min(kBlock, lights.size() - begin);
-    fill(block, lights.data() + begin, count, t);
-    d_base_color += sum_values(block, count, m).a * g;
-    for (size_t k = 0; k < count; ++k) {
-      const float s = block.schlick[k], specular = block.specular[k], diffuse = block.diffuse[k];
-      const float fresnel = kDielectricF0 + (1.0f - kDielectricF0) * s;
-      const float light = block.light_r[k] * g.x + block.light_g[k] * g.y + block.light_b[k] * g.z;
-      const float light_base =
-          block.light_r[k] * g_base.x + block.light_g[k] * g_base.y + block.light_b[k] * g_base.z;
-      d_metallic += light_base * ((1.0f - s) * specular - (1.0f - fresnel) * diffuse) +
-                    light * specular * (s - fresnel);
-
-      // What multiplies the specular and the diffuse lobe once channels are summed.
-      const float by_specular =
-          specular * (light_base * m * (1.0f - s) + light * ((1.0f - m) * fresnel + m * s));
-      const float by_diffuse = light_base * (1.0f - m) * (1.0f - fresnel) * (diffuse > 0.0f ? kInvPi : 0.0f);
-
-      const float n_i = block.n_i[k], root_i = block.root_i[k], n_h = block.n_h[k], base = block.base[k];
-      const float visibility_i = 1.0f / (std::abs(n_i) + root_i);
-      d_alpha += by_specular * (2.0f / t.alpha - 4.0f * t.alpha * n_h * n_h / base + alpha_o -
-                                visibility_i * t.alpha * (1.0f - n_i * n_i) / root_i);
-      // d ln(specular) / dn = 4 (n·h)(1−α²)/base · h + (masking terms) wo, wi + wi / n·wi, up to multiples of
-      // n, which the normalisation of the normal takes out again. h = (wo + wi) · inverse_h.
-      const float along_h = by_specular * 4.0f * n_h * one_minus_alpha2 / base * block.inverse_h[k];
-      const float masking_i = -visibility_i * (1.0f + one_minus_alpha2 * n_i / root_i);
-      const float safe_n_i = n_i > 1e-6f ? n_i : 1e-6f;
-      const float along_wi = along_h + by_specular * (masking_i + 1.0f / safe_n_i) + by_diffuse;
-      along_wo += along_h + by_specular * normal_o;
-      along_x += along_wi * block.wi_x[k];
-      along_y += along_wi * block.wi_y[k];
-      along_z += along_wi * block.wi_z[k];
-    }
-  }
-  const float roughness = shading.bsdf.roughness;
-  const float d_roughness = roughness * roughness > render::kMinAlpha ? 2.0f * roughness * d_alpha : 0.0f;
-  return map_gradient(sample.point, shading, d_base_color, d_roughness, d_metallic,
-                      vec3(along_x, along_y, along_z) + along_wo * t.wo);
+  const GradientSums sums = sum_gradients(lights_.size(), t, shading_->bsdf.metallic, d_radiance,
+                                          d_radiance * shading_->bsdf.base_color, terms_.data());
+  const float roughness = shading_->bsdf.roughness;
+  const float d_roughness = roughness * roughness > render::kMinAlpha ? 2.0f * roughness * sums.alpha : 0.0f;
+  return map_gradient(sample_->point, *shading_, sum_by_base_color_ * d_radiance, d_roughness, sums.metallic,
+                      vec3(sums.along_x, sums.along_y, sums.along_z) + sums.along_wo * t.wo);
 }
 
 ShadeResult shade_reference(render::BsdfModel model, const CacheSample& sample, const Shading& shading,

@@ -5,18 +5,32 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "patina/inverse/light_cache.h"
 
 namespace patina::inverse {
 
-/// Radiance that a sample sends to the eye, [3] linear: emission and reflection.
-vec3 shade(render::BsdfModel model, const CacheSample& sample, const Shading& shading,
-           std::span<const PackedLight> lights);
+/// Shades one sample after the other, and keeps what the gradient of the last one needs. One a thread.
+class Shader {
+ public:
+  explicit Shader(render::BsdfModel model) : model_(model) {}
 
-/// Gradient of dot(d_radiance, shade(...)) with respect to the map values.
-MapGradient shade_adjoint(render::BsdfModel model, const CacheSample& sample, const Shading& shading,
-                          std::span<const PackedLight> lights, const vec3& d_radiance);
+  /// Radiance that a sample sends to the eye, [3] linear: emission and reflection. The arguments must live
+  /// until the next call.
+  vec3 shade(const CacheSample& sample, const Shading& shading, std::span<const PackedLight> lights);
+
+  /// Gradient of dot(d_radiance, radiance of the sample shaded last) with respect to the map values.
+  MapGradient adjoint(const vec3& d_radiance) const;
+
+ private:
+  render::BsdfModel model_;
+  const CacheSample* sample_ = nullptr;
+  const Shading* shading_ = nullptr;
+  std::span<const PackedLight> lights_;
+  std::vector<float> terms_;      // of every light (shade.cpp)
+  vec3 sum_by_base_color_{0.0f};  // derivative of the radiance with respect to base colour
+};
 
 /// Value and gradient by the plain way, for any model.
 struct ShadeResult {

@@ -133,8 +133,10 @@ std::optional<LightSample> Lights::sample_extended(const vec3& p, float u_light,
   return out;
 }
 
-float Lights::pdf_environment(const vec3& direction) const {
-  return environment_probability_ > 0 ? environment_probability_ * environment_->pdf(direction) : 0.0f;
+Environment::Arrival Lights::arrival_from_environment(const vec3& direction) const {
+  Environment::Arrival arrival = environment_->arrival(direction);
+  arrival.pdf *= environment_probability_;
+  return arrival;
 }
 
 float Lights::pdf_triangle(uint32_t primitive, uint32_t triangle, const vec3& direction, float t,

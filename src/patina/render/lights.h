@@ -35,8 +35,10 @@ class Lights {
   /// One direction toward the environment or an emissive triangle (chosen in proportion to its power);
   /// nullopt if there is no such light or the triangle is seen edge-on. `u_light` chooses the light.
   std::optional<LightSample> sample_extended(const vec3& p, float u_light, const vec2& u) const;
-  /// Density with which sample_extended would have chosen `direction` toward the environment, 1/sr.
-  float pdf_environment(const vec3& direction) const;
+  /// What the environment sends from `direction`, and the density with which sample_extended would have
+  /// chosen that direction toward it, 1/sr.
+  Environment::Arrival arrival_from_environment(const vec3& direction) const;
+  float pdf_environment(const vec3& direction) const { return arrival_from_environment(direction).pdf; }
   /// The same for the point at distance `t` along `direction` on a triangle whose unit geometric normal is
   /// `n`.
   float pdf_triangle(uint32_t primitive, uint32_t triangle, const vec3& direction, float t,
@@ -48,6 +50,7 @@ class Lights {
 
   bool has_extended() const { return environment_probability_ > 0 || !emitters_.empty(); }
   bool has_punctual() const { return !punctual_.empty(); }
+  bool has_emitters() const { return !emitters_.empty(); }
 
  private:
   struct Emitter {

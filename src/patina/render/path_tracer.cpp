@@ -55,29 +55,25 @@ vec3 direct_light(const Scene& scene, const SurfacePoint& point, const Frame& fr
   return sum;
 }
 
-}  // namespace
-
-vec3 trace_path(const Scene& scene, const Ray& camera_ray, const PathOptions& options, RandomStream& random,
-                float* coverage) {
+/// Radiance along `ray`, which meets `hit`.
+vec3 follow_path(const Scene& scene, Ray ray, std::optional<Hit> hit, const PathOptions& options,
+                 RandomStream& random) {
   const Lights& lights = scene.light_sampler();
   const BsdfModel model = scene.bsdf_model();
   vec3 radiance(0.0f), throughput(1.0f);
-  Ray ray = camera_ray;
   float bsdf_pdf = 0.0f;  // of the direction of `ray`
-  if (coverage) *coverage = 0.0f;
 
   for (int depth = 0;; ++depth) {
     const bool from_camera = depth == 0;
-    const std::optional<Hit> hit = scene.intersect(ray, random.uniform());
     if (!hit) {
-      if (!from_camera)
-        radiance += throughput * scene.environment().radiance(ray.direction) *
-                    balance_heuristic(bsdf_pdf, lights.pdf_environment(ray.direction));
-      else if (options.show_environment)
+      if (!from_camera) {
+        const Environment::Arrival arrival = lights.arrival_from_environment(ray.direction);
+        radiance += throughput * arrival.radiance * balance_heuristic(bsdf_pdf, arrival.pdf);
+      } else if (options.show_environment) {
         radiance += scene.environment().radiance(ray.direction);
+      }
       return radiance;
     }
-    if (from_camera && coverage) *coverage = 1.0f;
 
     const SurfacePoint point = scene.surface(ray, *hit);
     if (max_component(point.emission) > 0.0f) {
@@ -107,7 +103,22 @@ vec3 trace_path(const Scene& scene, const Ray& camera_ray, const PathOptions& op
       throughput /= survival;
     }
     ray = spawn_ray(point, direction);
+    hit = scene.intersect(ray, random.uniform());
   }
+}
+
+}  // namespace
+
+vec3 trace_path(const Scene& scene, const Ray& ray, const PathOptions& options, RandomStream& random,
+                float* coverage) {
+  const std::optional<Hit> hit = scene.intersect(ray, random.uniform());
+  if (coverage) *coverage = hit ? 1.0f : 0.0f;
+  return follow_path(scene, ray, hit, options, random);
+}
+
+vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const PathOptions& options,
+                     RandomStream& random) {
+  return follow_path(scene, ray, first, options, random);
 }
 
 Render render(const Scene& scene, const Camera& camera, const PathOptions& options, const Progress& progress,

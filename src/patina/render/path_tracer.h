@@ -20,6 +20,9 @@ struct PathOptions {
 /// Radiance that arrives along one ray, [3] linear; `coverage` (may be null) gets 1 where a surface was hit, else 0.
 vec3 trace_path(const Scene& scene, const Ray& ray, const PathOptions& options, RandomStream& random, float* coverage = nullptr);
 
+/// The same where it is known already what the ray meets first. For scenes without blended surfaces, where that is certain.
+vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const PathOptions& options, RandomStream& random);
+
 struct Render {
   Image radiance;      // [H,W,3] linear HDR, premultiplied by coverage when the environment is not shown
   Image coverage;      // [H,W,1] share of camera rays that hit a surface, [0,1]

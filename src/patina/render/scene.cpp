@@ -226,6 +226,9 @@ const Lights& Scene::light_sampler() const {
 asset::Bounds Scene::bounds() const {
   return state_->bounds;
 }
+bool Scene::has_blended() const {
+  return state_->has_blend;
+}
 BsdfModel Scene::bsdf_model() const {
   return state_->bsdf_model;
 }

@@ -89,6 +89,8 @@ class Scene {
   const Lights& light_sampler() const;
   /// Bounds of all geometry.
   asset::Bounds bounds() const;
+  /// Whether some surface lets a part of the light through (alpha mode BLEND).
+  bool has_blended() const;
   BsdfModel bsdf_model() const;
 
   struct State;   // scene_state.h
