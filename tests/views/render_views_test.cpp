@@ -67,6 +67,15 @@ TEST_F(RenderViews, exposure_lays_a_grey_card_onto_middle_grey) {
   }
 }
 
+TEST_F(RenderViews, exposure_leaves_out_pixels_whose_centre_meets_nothing) {
+  ViewSet views = render_views(scene(1.0f), cameras(), quick(), {});
+  GBuffer& g = views.views[0].gbuffer;
+  const auto full = std::find(g.coverage.begin(), g.coverage.end(), 1.0f);
+  ASSERT_NE(full, g.coverage.end());
+  g.reflectance[static_cast<size_t>(full - g.coverage.begin())] = 0.0f;
+  EXPECT_NEAR(choose_exposure(views.views), views.exposure_ev, 0.01f);
+}
+
 TEST_F(RenderViews, exposure_follows_the_unit_of_light) {
   const float one = render_views(scene(1.0f), cameras(), quick(), {}).exposure_ev;
   const float eight = render_views(scene(8.0f), cameras(), quick(), {}).exposure_ev;

@@ -21,9 +21,10 @@ using Clock = std::chrono::steady_clock;
 
 // Iterations take turns over this many light caches, each with its own points and directions, and the oldest
 // is traced anew with the current materials kRefreshes times in a fit: no fixed noise is there long enough to
-// be fitted.
+// be fitted. Many caches of few directions find more than few caches of many: for the same rays they also give
+// the pixel more points.
 constexpr int kCaches = 4;
-constexpr int kRefreshes = 16;
+constexpr int kRefreshes = 40;
 // The prior on a fitted map. Each pyramid level holds detail of one size; `detail` is the cost of a texel's
 // squared coefficient at the finest level, in units of one fully weighted pixel's loss, a quarter of that a
 // level up, and so on: where the views say little, the smoother answer wins, while large areas move freely.
@@ -35,7 +36,7 @@ struct Prior {
 Prior prior_of(Slot slot) {
   switch (slot) {
     case Slot::kBaseColor:
-      return {1.0f, 0.05f, 1e-3f};
+      return {3.0f, 0.05f, 1e-3f};
     case Slot::kRoughness:
       return {2.0f, 0.1f, 2e-3f};
     case Slot::kMetallic:
@@ -43,7 +44,7 @@ Prior prior_of(Slot slot) {
     case Slot::kNormal:
       break;
   }
-  return {4.0f, 0.1f, 6.0f};
+  return {16.0f, 0.1f, 6.0f};
 }
 
 // Maps join one after the other, at these shares of the iterations: while a colour is far too bright, a
@@ -59,7 +60,7 @@ float start_of(Slot slot) {
     case Slot::kNormal:
       break;
   }
-  return 0.3f;
+  return 0.15f;
 }
 
 // The first fiftieth of the iterations moves levels from a quarter of the finest size down, the second from
@@ -200,7 +201,7 @@ float rate_of(Slot slot) {
     case Slot::kNormal:
       break;
   }
-  return 0.15f;
+  return 0.07f;
 }
 
 // A cosine from full speed down to a fiftieth: the last iterations average the noise out.

@@ -21,7 +21,7 @@ struct FitOptions {
   bool fit_base_color = true, fit_roughness = true, fit_normal = true, fit_metallic = false;
   std::vector<bool> materials;  // which materials may change; empty: all of the asset
   float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
-  int light_samples = 32;       // incident directions kept a pixel
+  int light_samples = 8;        // incident directions kept a pixel
   int max_depth = 4;            // of the paths that gather incident light
   int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
   uint64_t seed = 0;

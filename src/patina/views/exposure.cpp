@@ -10,7 +10,8 @@ float choose_exposure(std::span<const View> views) {
   double sum = 0;
   for (const View& view : views) {
     for (size_t pixel = 0; pixel < view.gbuffer.coverage.size(); ++pixel) {
-      if (view.gbuffer.coverage[pixel] < 1.0f) continue;
+      // A ray through a pixel's centre may pass between two triangles where all those around it meet them.
+      if (view.gbuffer.coverage[pixel] < 1.0f || !(view.gbuffer.reflectance[pixel] > 0.0f)) continue;
       const float* rgb = &view.radiance.pixels[3 * pixel];
       incident.push_back(luminance(vec3(rgb[0], rgb[1], rgb[2])) / view.gbuffer.reflectance[pixel]);
       sum += incident.back();
