@@ -144,6 +144,7 @@ AxisTap axis_tap(float u, int size, Wrap wrap) {
   const float x = bounded * static_cast<float>(size) - 0.5f;
   const float floor = std::floor(x);
   const auto i = static_cast<int64_t>(floor);
+  if (i >= 0 && i + 1 < size) return {{static_cast<int>(i), static_cast<int>(i) + 1}, x - floor};
   return {{wrapped(i, size, wrap), wrapped(i + 1, size, wrap)}, x - floor};
 }
 
@@ -180,27 +181,36 @@ BilinearTap bilinear_tap(const Map& map, const vec2& uv_map) {
            y.weight * x.weight}};
 }
 
-float sample1(const Map& map, const vec2& uv_map) {
+bool same_layout(const Map& a, const Map& b) {
+  return a.texels.width == b.texels.width && a.texels.height == b.texels.height && a.uv_set == b.uv_set &&
+         a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t && a.uv_transform == b.uv_transform;
+}
+
+float read1(const Map& map, const BilinearTap& tap) {
   PATINA_CHECK_EQ(map.texels.channels, 1);
   const float* texels = map.texels.pixels.data();
-  if (map.texels.pixels.size() == 1) return texels[0];
-  const BilinearTap tap = bilinear_tap(map, uv_map);
   float sum = 0;
   for (size_t k = 0; k < 4; ++k) sum += tap.weight[k] * texels[tap.texel[k]];
   return sum;
 }
 
-vec3 sample3(const Map& map, const vec2& uv_map) {
+vec3 read3(const Map& map, const BilinearTap& tap) {
   PATINA_CHECK_EQ(map.texels.channels, 3);
   const float* texels = map.texels.pixels.data();
-  if (map.texels.pixels.size() == 3) return {texels[0], texels[1], texels[2]};
-  const BilinearTap tap = bilinear_tap(map, uv_map);
   vec3 sum(0.0f);
   for (size_t k = 0; k < 4; ++k) {
     const float* t = texels + 3 * static_cast<size_t>(tap.texel[k]);
     sum += tap.weight[k] * vec3(t[0], t[1], t[2]);
   }
   return sum;
+}
+
+float sample1(const Map& map, const vec2& uv_map) {
+  return map.texels.pixels.size() == 1 ? map.texels.pixels[0] : read1(map, bilinear_tap(map, uv_map));
+}
+
+vec3 sample3(const Map& map, const vec2& uv_map) {
+  return map.texels.pixels.size() == 3 ? map.texels.rgb(0, 0) : read3(map, bilinear_tap(map, uv_map));
 }
 
 namespace {

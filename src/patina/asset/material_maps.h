@@ -51,8 +51,13 @@ struct BilinearTap {
   std::array<float, 4> weight;
 };
 BilinearTap bilinear_tap(const Map& map, const vec2& uv_map);
+/// Whether one tap serves both maps at any point of the surface. Maps of a material mostly share their
+/// layout.
+bool same_layout(const Map& a, const Map& b);
 
-/// Bilinear value of a map with 1 or 3 channels.
+/// Value of a map with 1 or 3 channels, by a tap of its layout or by its own.
+float read1(const Map& map, const BilinearTap& tap);
+vec3 read3(const Map& map, const BilinearTap& tap);
 float sample1(const Map& map, const vec2& uv_map);
 vec3 sample3(const Map& map, const vec2& uv_map);
 

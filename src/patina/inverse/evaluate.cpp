@@ -17,11 +17,6 @@ constexpr int64_t kNumbersPerTask = 1 << 15;
 constexpr size_t kMaxParts = 4;
 constexpr size_t kPartBytes = size_t{256} << 20;
 
-bool same_layout(const asset::Map& a, const asset::Map& b) {
-  return a.texels.width == b.texels.width && a.texels.height == b.texels.height && a.uv_set == b.uv_set &&
-         a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t && a.uv_transform == b.uv_transform;
-}
-
 // How far the stored values of a sample lie beyond their bounds, signed; zero inside.
 struct Overshoot {
   vec3 base_color{0.0f};
@@ -113,7 +108,7 @@ Evaluator::Evaluator(std::span<const FittedMap> fitted, render::BsdfModel model,
     fields.map[s] = &map;
     fields.layout[s] = static_cast<int>(s);
     for (size_t earlier = 0; earlier < s; ++earlier)
-      if (fields.map[earlier] && same_layout(fields.map[earlier]->field.delta, map.field.delta)) {
+      if (fields.map[earlier] && asset::same_layout(fields.map[earlier]->field.delta, map.field.delta)) {
         fields.layout[s] = fields.layout[earlier];
         break;
       }

@@ -21,10 +21,10 @@ using Clock = std::chrono::steady_clock;
 
 // Iterations take turns over this many light caches, each with its own points and directions, and the oldest
 // is traced anew with the current materials kRefreshes times in a fit: no fixed noise is there long enough to
-// be fitted. Many caches of few directions find more than few caches of many: for the same rays they also give
-// the pixel more points.
+// be fitted. Many caches of few directions find more than few caches of many: for the same rays they also
+// give the pixel more points.
 constexpr int kCaches = 4;
-constexpr int kRefreshes = 40;
+constexpr int kRefreshes = 36;
 // The prior on a fitted map. Each pyramid level holds detail of one size; `detail` is the cost of a texel's
 // squared coefficient at the finest level, in units of one fully weighted pixel's loss, a quarter of that a
 // level up, and so on: where the views say little, the smoother answer wins, while large areas move freely.

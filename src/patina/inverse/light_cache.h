@@ -51,7 +51,7 @@ struct LightCache {
 
 struct CacheOptions {
   int light_samples = 8;  // directions a pixel
-  int max_depth = 4;       // path segments after the camera ray
+  int max_depth = 4;      // path segments after the camera ray
   uint64_t seed = 0;
   uint32_t generation = 0;  // another one gives other points and directions
 };

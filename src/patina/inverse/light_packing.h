@@ -18,7 +18,7 @@ inline uint32_t pack_direction(const vec3& d) {
   if (d.z < 0.0f)
     p = vec2(std::copysign(1.0f - std::abs(p.y), p.x), std::copysign(1.0f - std::abs(p.x), p.y));
   const auto quantised = [](float v) {
-    return static_cast<uint32_t>(std::lround(std::clamp(v, -1.0f, 1.0f) * 32767.0f) + 32767);
+    return static_cast<uint32_t>(std::clamp(v, -1.0f, 1.0f) * 32767.0f + 32767.5f);
   };
   return quantised(p.x) | quantised(p.y) << 16;
 }
@@ -43,9 +43,9 @@ inline uint32_t pack_radiance(const vec3& rgb) {
   int exponent = 0;
   std::frexp(std::min(largest, 1e30f), &exponent);
   float scale = std::ldexp(1.0f, 8 - exponent);
-  if (std::lround(std::min(largest, 1e30f) * scale) > 255) scale = std::ldexp(1.0f, 8 - ++exponent);
+  if (std::min(largest, 1e30f) * scale + 0.5f >= 256.0f) scale = std::ldexp(1.0f, 8 - ++exponent);
   const auto mantissa = [&](float v) {
-    return static_cast<uint32_t>(std::clamp(std::lround(std::min(v, 1e30f) * scale), 0L, 255L));
+    return static_cast<uint32_t>(std::clamp(std::min(v, 1e30f) * scale + 0.5f, 0.0f, 255.0f));
   };
   return mantissa(rgb.x) | mantissa(rgb.y) << 8 | mantissa(rgb.z) << 16 |
          static_cast<uint32_t>(exponent + 127) << 24;

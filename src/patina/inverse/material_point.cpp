@@ -42,12 +42,21 @@ MaterialPoint material_point(const render::SurfacePoint& surface, const vec3& wo
 }
 
 MapValues sample_maps(const asset::MaterialMaps& maps, const MaterialPoint& point) {
-  const auto uv = [&](Slot slot) { return point.uv[static_cast<size_t>(slot)]; };
+  const asset::Map* last = nullptr;
+  vec2 last_uv(0.0f);
+  asset::BilinearTap tap{};
+  const auto tap_of = [&](Slot slot) -> const asset::BilinearTap& {
+    const asset::Map& map = slot_map(maps, slot);
+    const vec2& uv = point.uv[static_cast<size_t>(slot)];
+    if (!last || uv != last_uv || !asset::same_layout(*last, map)) tap = asset::bilinear_tap(map, uv);
+    last = &map, last_uv = uv;
+    return tap;
+  };
   MapValues values;
-  values.base_color = asset::sample3(maps.base_color, uv(Slot::kBaseColor));
-  values.roughness = asset::sample1(maps.roughness, uv(Slot::kRoughness));
-  values.metallic = asset::sample1(maps.metallic, uv(Slot::kMetallic));
-  values.normal = asset::sample3(maps.normal, uv(Slot::kNormal));
+  values.base_color = asset::read3(maps.base_color, tap_of(Slot::kBaseColor));
+  values.roughness = asset::read1(maps.roughness, tap_of(Slot::kRoughness));
+  values.metallic = asset::read1(maps.metallic, tap_of(Slot::kMetallic));
+  values.normal = asset::read3(maps.normal, tap_of(Slot::kNormal));
   return values;
 }
 

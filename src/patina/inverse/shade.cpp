@@ -58,7 +58,8 @@ PointTerms point_terms(const CacheSample& sample, const Shading& shading) {
 
 // Terms of a step's lights; those below the shading normal get none. One pointer and fixed distances: the
 // compiler must see that no array overlaps another.
-inline __attribute__((always_inline)) void fill_step(const PackedLight* lights, const PointTerms& t, float* step) {
+inline __attribute__((always_inline)) void fill_step(const PackedLight* lights, const PointTerms& t,
+                                                     float* step) {
   const float nx = t.n.x, ny = t.n.y, nz = t.n.z, ox = t.wo.x, oy = t.wo.y, oz = t.wo.z;
   const float alpha2 = t.alpha2, one_minus_alpha2 = 1.0f - t.alpha2;
   const float specular_scale = alpha2 * kInvPi * t.visibility_o;

@@ -23,44 +23,27 @@ vec3 lookup3(const asset::Map& map, const vec2& uv_map) {
   return map.texels.num_pixels() == 1 ? map.texels.rgb(0, 0) : asset::sample3(map, uv_map);
 }
 
-/// Reads several maps at one point. Maps of a material mostly share size, UV set, transform and wrap modes:
-/// their bilinear tap is then computed once.
+/// Reads several maps at one point; maps of one layout share their tap.
 class MapReader {
  public:
   explicit MapReader(const SurfacePoint& point) : point_(point) {}
 
   float read1(const asset::Map& map) {
-    if (map.texels.num_pixels() == 1) return map.texels.pixels[0];
-    const asset::BilinearTap& tap = tap_of(map);
-    float sum = 0.0f;
-    for (size_t i = 0; i < 4; ++i)
-      sum += tap.weight[i] * map.texels.pixels[static_cast<size_t>(tap.texel[i])];
-    return sum;
+    return map.texels.num_pixels() == 1 ? map.texels.pixels[0] : asset::read1(map, tap_of(map));
   }
   vec3 read3(const asset::Map& map) {
-    if (map.texels.num_pixels() == 1) return map.texels.rgb(0, 0);
-    const asset::BilinearTap& tap = tap_of(map);
-    vec3 sum(0.0f);
-    for (size_t i = 0; i < 4; ++i) {
-      const float* texel = map.texels.pixels.data() + 3 * static_cast<size_t>(tap.texel[i]);
-      sum += tap.weight[i] * vec3(texel[0], texel[1], texel[2]);
-    }
-    return sum;
+    return map.texels.num_pixels() == 1 ? map.texels.rgb(0, 0) : asset::read3(map, tap_of(map));
   }
 
  private:
   const asset::BilinearTap& tap_of(const asset::Map& map) {
-    if (!last_ || !same_layout(*last_, map)) {
+    if (!last_ || !asset::same_layout(*last_, map)) {
       const auto set = static_cast<size_t>(map.uv_set);
       tap_ = asset::bilinear_tap(map,
                                  asset::map_uv(map, set < point_.num_uv_sets ? point_.uv[set] : vec2(0.0f)));
       last_ = &map;
     }
     return tap_;
-  }
-  static bool same_layout(const asset::Map& a, const asset::Map& b) {
-    return a.texels.width == b.texels.width && a.texels.height == b.texels.height && a.uv_set == b.uv_set &&
-           a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t && a.uv_transform == b.uv_transform;
   }
 
   const SurfacePoint& point_;
