@@ -2,7 +2,7 @@
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
-#   make bench-noise, bench-attention, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
+#   make bench-noise, bench-attention, bench-inverse, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
 #   make gallery      the pictures of docs/gallery.md
 #   make bench-mini   how good the small model is: build/bench/mini.json and pictures (docs/measuring-mini.md)
 
@@ -18,7 +18,7 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-unet bench-mini gallery clean format tidy
+.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini gallery clean format tidy
 
 setup:
 	@scripts/setup.sh
@@ -55,6 +55,13 @@ bench-attention: setup
 	OMP_WAIT_POLICY=passive build/release/bench_attention build/bench/attention.json
 	@if nvidia-smi > /dev/null 2>&1; then python3 bench/bench_attention_cuda.py --report build/bench/attention.json; \
 	else echo "No GPU here; where there is one:  python3 bench/bench_attention_cuda.py"; fi
+
+bench-inverse: setup
+	@cmake --preset release -DPATINA_BUILD_BENCH=ON
+	@cmake --build build/release --parallel $(JOBS) --target bench_inverse
+	build/release/bench_inverse --shared $(SHARED) --out build/bench/inverse.json
+	@if $(PEER_PYTHON) -c "import mitsuba" 2> /dev/null; then $(PEER_PYTHON) bench/inverse/mitsuba_peer.py --report build/bench/inverse.json; \
+	else echo "No Mitsuba beside this; how to have it:  python3 bench/inverse/mitsuba_peer.py --help"; fi
 
 bench-unet: setup
 	@cmake --preset release -DPATINA_BUILD_BENCH=ON

@@ -1,9 +1,12 @@
 #include "recovery.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 
 #include "patina/image/color.h"
+#include "patina/inverse/evidence.h"
+#include "patina/inverse/loss.h"
 #include "patina/inverse/material_point.h"
 #include "patina/render/path_tracer.h"
 
@@ -44,6 +47,50 @@ size_t seen_material(const Recovery& recovery) {
   return 0;
 }
 
+// How many views see each base-colour texel, counted where texels are about as large as pixels.
+std::vector<Image> views_of_texels(const render::Scene& scene, const Recovery& r,
+                                   const inverse::FitOptions& options) {
+  std::vector<Image> targets, weights;
+  for (size_t v = 0; v < r.targets.size(); ++v) {
+    targets.push_back(inverse::loss_target(r.targets[v]));
+    weights.push_back(inverse::loss_weight(r.views.views[v].gbuffer, {}, options.boundary_pixels));
+  }
+  const std::vector<inverse::CachePixel> pixels = inverse::select_pixels(r.views, targets, weights);
+  std::vector<Image> counts;
+  std::vector<float> across;
+  for (size_t m = 0; m < r.truth.size(); ++m) {
+    const asset::Map& map = r.fit.maps[m].base_color;
+    across.push_back(
+        std::max(1.0f, inverse::texels_per_pixel(scene, r.views, pixels, map, static_cast<int>(m))));
+    counts.emplace_back(std::max(1, static_cast<int>(static_cast<float>(map.texels.width) / across[m])),
+                        std::max(1, static_cast<int>(static_cast<float>(map.texels.height) / across[m])), 1);
+  }
+  for (auto begin = pixels.begin(); begin != pixels.end();) {
+    const auto end = std::find_if(begin, pixels.end(), [&](const auto& p) { return p.view != begin->view; });
+    const auto seen = inverse::trace_seen_points(scene, r.views, {begin, end});
+    for (size_t m = 0; m < counts.size(); ++m) {
+      const Image evidence = inverse::evidence_of(r.fit.maps[m].base_color, counts[m].width, counts[m].height,
+                                                  inverse::Slot::kBaseColor, static_cast<int>(m), seen);
+      for (size_t i = 0; i < evidence.pixels.size(); ++i) counts[m].pixels[i] += evidence.pixels[i] > 0.0f;
+    }
+    begin = end;
+  }
+  for (size_t m = 0; m < counts.size(); ++m) {
+    const Image& size = r.fit.maps[m].base_color.texels;
+    Image full(size.width, size.height, 1);
+    for (int y = 0; y < size.height; ++y)
+      for (int x = 0; x < size.width; ++x)
+        *full.at(x, y) = *counts[m].at(x * counts[m].width / size.width, y * counts[m].height / size.height);
+    counts[m] = std::move(full);
+  }
+  return counts;
+}
+
+float texel_of(const asset::Map& map, size_t i, size_t c) {
+  return map.texels.num_pixels() == 1 ? map.texels.pixels[c]
+                                      : map.texels.pixels[i * static_cast<size_t>(map.texels.channels) + c];
+}
+
 }  // namespace
 
 Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions& options,
@@ -53,16 +100,16 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
   r.truth = asset::resolve_materials(r.asset);
   r.start = r.truth;
   for (asset::MaterialMaps& maps : r.start) {
-    if (options.start_at_truth) break;
     flatten(maps.base_color);
     flatten(maps.roughness);
-    if (options.flatten_metallic) flatten(maps.metallic);
     std::fill(maps.normal.texels.pixels.begin(), maps.normal.texels.pixels.end(), 0.0f);
     for (size_t i = 2; i < maps.normal.texels.pixels.size(); i += 3) maps.normal.texels.pixels[i] = 1.0f;
   }
 
   auto begin = Clock::now();
-  render::Scene scene(r.asset, r.truth, render::studio_environment());
+  render::Scene scene(r.asset, r.truth,
+                      options.environment.empty() ? render::studio_environment()
+                                                  : render::read_environment(options.environment));
   views::OrbitOptions orbit;
   orbit.resolution = options.resolution;
   const auto cameras = views::orbit_cameras(asset::bounds(r.asset), orbit);
@@ -78,40 +125,67 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
   scene.set_asset_materials(r.start);
   r.fit = inverse::fit_materials(scene, r.views, r.targets, options.fit, {}, progress);
   r.fit_seconds = seconds_since(begin);
+  r.num_views = views_of_texels(scene, r, options.fit);
   return r;
 }
 
-MapErrors map_errors(const Recovery& r, const std::vector<asset::MaterialMaps>& all_maps) {
-  const size_t m = seen_material(r);
-  const asset::MaterialMaps &truth = r.truth[m], &maps = all_maps[m];
-  const Image& evidence = r.fit.evidence[m];
+bool counts(const Recovery& r, size_t material, size_t texel, int min_views) {
+  return r.fit.evidence[material].pixels[texel] >= kMinEvidence &&
+         r.num_views[material].pixels[texel] >= static_cast<float>(min_views);
+}
+
+MapErrors map_errors(const Recovery& r, const std::vector<asset::MaterialMaps>& all_maps, int min_views) {
   MapErrors errors;
-  double count = 0, squared = 0, roughness = 0, metallic = 0, angle = 0;
-  const auto texel = [&](const asset::Map& map, size_t i, size_t c) {
-    return map.texels.num_pixels() == 1 ? map.texels.pixels[c]
-                                        : map.texels.pixels[i * static_cast<size_t>(map.texels.channels) + c];
-  };
-  for (size_t i = 0; i < evidence.pixels.size(); ++i) {
-    if (evidence.pixels[i] < kMinEvidence) continue;
-    count += 1;
-    vec3 n_true, n;
-    for (size_t c = 0; c < 3; ++c) {
-      const double d =
-          srgb_from_linear(texel(truth.base_color, i, c)) - srgb_from_linear(texel(maps.base_color, i, c));
-      squared += d * d / 3;
-      n_true[static_cast<int>(c)] = texel(truth.normal, i, c);
-      n[static_cast<int>(c)] = texel(maps.normal, i, c);
+  double count = 0, all = 0, squared = 0, roughness = 0, metallic = 0, angle = 0;
+  for (size_t m = 0; m < all_maps.size(); ++m) {
+    const size_t num_texels = r.fit.evidence[m].pixels.size();
+    all += static_cast<double>(num_texels);
+    // Truth and maps at the size of the result: slots without a texture got one.
+    const auto sized = [&](const asset::Map& map, const asset::Map& like) {
+      return map.texels.num_pixels() == 1 ? map : asset::resized(map, like.texels.width, like.texels.height);
+    };
+    const asset::MaterialMaps& fitted = r.fit.maps[m];
+    asset::MaterialMaps truth, maps;
+    for (const auto slot : inverse::kSlots) {
+      inverse::slot_map(truth, slot) = sized(inverse::slot_map(r.truth[m], slot), fitted.base_color);
+      inverse::slot_map(maps, slot) = sized(inverse::slot_map(all_maps[m], slot), fitted.base_color);
     }
-    roughness += std::abs(texel(truth.roughness, i, 0) - texel(maps.roughness, i, 0));
-    metallic += std::abs(texel(truth.metallic, i, 0) - texel(maps.metallic, i, 0));
-    angle += std::acos(glm::clamp(glm::dot(glm::normalize(n_true), glm::normalize(n)), -1.0f, 1.0f));
+    for (size_t i = 0; i < num_texels; ++i) {
+      if (!counts(r, m, i, min_views)) continue;
+      count += 1;
+      vec3 n_true, n;
+      for (size_t c = 0; c < 3; ++c) {
+        const double d = srgb_from_linear(texel_of(truth.base_color, i, c)) -
+                         srgb_from_linear(texel_of(maps.base_color, i, c));
+        squared += d * d / 3;
+        n_true[static_cast<int>(c)] = texel_of(truth.normal, i, c);
+        n[static_cast<int>(c)] = texel_of(maps.normal, i, c);
+      }
+      roughness += std::abs(texel_of(truth.roughness, i, 0) - texel_of(maps.roughness, i, 0));
+      metallic += std::abs(texel_of(truth.metallic, i, 0) - texel_of(maps.metallic, i, 0));
+      angle += std::acos(glm::clamp(glm::dot(glm::normalize(n_true), glm::normalize(n)), -1.0f, 1.0f));
+    }
   }
   errors.base_color_psnr = -10 * std::log10(squared / count);
   errors.roughness_mae = roughness / count;
   errors.metallic_mae = metallic / count;
   errors.normal_degrees = glm::degrees(angle / count);
-  errors.seen_share = count / static_cast<double>(evidence.pixels.size());
+  errors.seen_share = count / all;
   return errors;
+}
+
+double base_color_agreement(const Recovery& a, const Recovery& b, int min_views) {
+  double squared = 0, count = 0;
+  for (size_t m = 0; m < a.fit.maps.size(); ++m)
+    for (size_t i = 0; i < a.fit.evidence[m].pixels.size(); ++i) {
+      if (!counts(a, m, i, min_views) || !counts(b, m, i, min_views)) continue;
+      for (size_t c = 0; c < 3; ++c, ++count) {
+        const double d = srgb_from_linear(texel_of(a.fit.maps[m].base_color, i, c)) -
+                         srgb_from_linear(texel_of(b.fit.maps[m].base_color, i, c));
+        squared += d * d;
+      }
+    }
+  return -10 * std::log10(squared / count);
 }
 
 Image view_strip(const Recovery& r, size_t view, int samples_per_pixel) {

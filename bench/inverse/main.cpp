@@ -1,0 +1,153 @@
+// How well and how fast inverse rendering finds known textures: an asset's textures are flattened to their
+// means, nine views of the true ones, rendered by the path tracer, are the targets. Writes errors, seconds and
+// memory as JSON after every asset, goes on where it was stopped, draws strips "true | start | recovered", and
+// leaves the first asset's scene for mitsuba_peer.py.
+//
+//   bench_inverse [--shared ../shared] [--resolution 512] [--samples 128] [--iterations 200] [--only NAME]
+//                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "../../tests/inverse/recovery.h"
+#include "export_scene.h"
+#include "path_replay_fit.h"
+#include "patina/base/files.h"
+#include "patina/image/image_io.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace patina;
+using nlohmann::json;
+
+// The first is relit, and timed against path replay.
+constexpr const char* kAssets[] = {"WaterBottle/WaterBottle.gltf", "BoomBoxWithAxes/BoomBoxWithAxes.gltf",
+                                   "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "Suzanne/Suzanne.gltf",
+                                   "ToyCar/ToyCar.gltf"};
+constexpr const char* kOtherEnvironment = "assets/hdri/st_fagans_interior_1k.hdr";
+constexpr int kMinViews = 2;     // that see a texel that counts
+constexpr int kReplayPaths = 8;  // a pixel: as many as the cache keeps directions
+
+struct Options {
+  fs::path shared = "../shared", out = "build/bench/inverse.json", pictures = "build/bench/inverse";
+  std::string only;
+  test::RecoveryOptions recovery;
+};
+
+double peak_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+void draw(const test::Recovery& r, const fs::path& folder, const std::string& name) {
+  fs::create_directories(folder);
+  write_image(folder / (name + "_views.png"), test::view_strip(r, 3, 256));
+  write_image(folder / (name + "_base_color.png"), test::texture_strip(r, 0, 384));
+  write_image(folder / (name + "_roughness.png"), test::texture_strip(r, 1, 384));
+  write_image(folder / (name + "_normal.png"), test::texture_strip(r, 3, 384));
+}
+
+json measured(const test::Recovery& r) {
+  const test::MapErrors start = test::map_errors(r, r.start, kMinViews),
+                        found = test::map_errors(r, r.fit.maps, kMinViews);
+  return {{"base_color_psnr", found.base_color_psnr},
+          {"roughness_mae", found.roughness_mae},
+          {"normal_degrees", found.normal_degrees},
+          {"seen_share", found.seen_share},
+          {"start_psnr", start.base_color_psnr},
+          {"start_roughness_mae", start.roughness_mae},
+          {"start_normal_degrees", start.normal_degrees},
+          {"rerendered_psnr", r.fit.psnr},
+          {"seconds", r.fit_seconds}};
+}
+
+bool has(const json& report, const std::string& name) {
+  for (const json& entry : report["assets"])
+    if (entry["name"] == name) return true;
+  return false;
+}
+
+void run(const Options& options) {
+  const json settings{{"resolution", options.recovery.resolution},
+                      {"samples", options.recovery.samples_per_pixel},
+                      {"iterations", options.recovery.fit.iterations}};
+  json report = json::object();
+  if (fs::exists(options.out)) report = json::parse(read_text_file(options.out));
+  if (report.value("settings", json()) != settings)
+    report = {{"settings", settings}, {"assets", json::array()}};
+
+  for (const char* file : kAssets) {
+    const std::string name = fs::path(file).stem().string();
+    if ((!options.only.empty() && options.only != name) || has(report, name)) continue;
+    const test::Recovery r = test::recover(options.shared / "assets" / file, options.recovery);
+    json entry = measured(r);
+    entry["name"] = name;
+    std::printf(
+        "%-24s base colour %.2f -> %.2f dB, roughness MAE %.3f -> %.3f, normals %.2f -> %.2f deg, %.1f s\n",
+        name.c_str(), entry["start_psnr"].get<double>(), entry["base_color_psnr"].get<double>(),
+        entry["start_roughness_mae"].get<double>(), entry["roughness_mae"].get<double>(),
+        entry["start_normal_degrees"].get<double>(), entry["normal_degrees"].get<double>(), r.fit_seconds);
+    std::fflush(stdout);
+    draw(r, options.pictures, name);
+    if (file == kAssets[0]) {
+      report["seconds_9x512"] = r.fit_seconds;
+      report["peak_mb"] = peak_mb();
+      bench::export_scene(r, kMinViews, options.pictures / "scene");
+      const double replay = bench::path_replay_iteration_seconds(r, options.recovery.fit, kReplayPaths);
+      report["reference_over_cache"] = replay * options.recovery.fit.iterations / r.fit_seconds;
+      test::RecoveryOptions other = options.recovery;
+      other.environment = options.shared / kOtherEnvironment;
+      report["relit_psnr"] =
+          test::base_color_agreement(r, test::recover(options.shared / "assets" / file, other), kMinViews);
+      std::printf("path replay / light cache %.1f, base colours under two lights agree to %.2f dB\n",
+                  report["reference_over_cache"].get<double>(), report["relit_psnr"].get<double>());
+    }
+    report["assets"].push_back(std::move(entry));
+    write_file(options.out, report.dump(1) + "\n");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.recovery.resolution = 512;
+  for (int i = 1; i < argc; i += 2) {
+    const std::string flag = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
+    const int number = std::atoi(value.c_str());
+    if (flag == "--shared" && !value.empty())
+      options.shared = value;
+    else if (flag == "--out" && !value.empty())
+      options.out = value;
+    else if (flag == "--pictures" && !value.empty())
+      options.pictures = value;
+    else if (flag == "--only" && !value.empty())
+      options.only = value;
+    else if (flag == "--resolution" && number > 0)
+      options.recovery.resolution = number;
+    else if (flag == "--samples" && number > 0)
+      options.recovery.samples_per_pixel = number;
+    else if (flag == "--iterations" && number > 0)
+      options.recovery.fit.iterations = number;
+    else {
+      std::fprintf(
+          stderr,
+          "usage: bench_inverse [--shared DIR] [--resolution 512] [--samples 128] [--iterations 200] "
+          "[--only NAME] [--out FILE] [--pictures DIR]\n");
+      return 2;
+    }
+  }
+  try {
+    run(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_inverse: %s\n", error.what());
+    return 1;
+  }
+}
