@@ -3,10 +3,13 @@
     python3 -m venv peers && peers/bin/pip install mitsuba numpy
     peers/bin/python bench/inverse/mitsuba_peer.py --report build/bench/inverse.json
 
-Same triangles, cameras, environment, texture sizes, loss and start; Mitsuba's own `principled` BSDF, its own targets rendered
-with it, variant llvm_ad_rgb, integrator prb, Adam. A step renders one view (drawn at random), which converges sooner than steps
-over all nine. Stops when the base colours are as near to the truth as patina's, or after --minutes: then mitsuba_over_patina is
+Same triangles, cameras, environment, loss and start; Mitsuba's own `principled` BSDF, its own targets rendered with it, variant
+llvm_ad_rgb, integrator prb, Adam. Textures are shrunk to two texels a pixel of a view's side, as patina's fit does by itself: at
+full size most texels are met by no path, and the others follow single ones. A step renders one view (drawn at random), which
+converges sooner than steps over all nine. Stops when the base colours are as near to the truth as patina's, or after --minutes: then mitsuba_over_patina is
 a lower bound, and mitsuba_reached says false. Adds mitsuba_* to the report.
+
+Where LLVM fails ("Cannot select"), it is older than the processor: DRJIT_LIBLLVM_PATH names a newer libLLVM.so (Debian: libllvm19).
 """
 
 import argparse
@@ -52,6 +55,15 @@ def main():
     }
     counted = array("counted.f32", np.float32, *scene_json["base_color"]) > 0
     resolution = scene_json["resolution"]
+
+    def shrunk(values):
+        factor = max(1, values.shape[0] // (2 * resolution))
+        height, width = values.shape[0] // factor, values.shape[1] // factor
+        pooled = values[: height * factor, : width * factor].reshape(height, factor, width, factor, -1).mean((1, 3))
+        return np.ascontiguousarray(pooled, np.float32)
+
+    truth = {name: shrunk(values) for name, values in truth.items()}
+    counted = shrunk(counted[..., None].astype(np.float32))[..., 0] > 0.5
 
     def texture(values):
         return {"type": "bitmap", "bitmap": mi.Bitmap(values), "raw": True, "filter_type": "bilinear", "format": "variant"}

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "../support.h"
 #include "patina/base/error.h"
+#include "patina/base/random.h"
 #include "patina/image/image_io.h"
 
 namespace patina::render {
@@ -36,6 +39,25 @@ TEST(environment, wraps_in_azimuth) {
   // Looking along -X the look-up stands between the first and the last column.
   EXPECT_NEAR(environment.radiance(glm::normalize(vec3(-1, 0, 1e-6f))).x, 31.5f, 0.1f);
   EXPECT_NEAR(environment.radiance(glm::normalize(vec3(-1, 0, -1e-6f))).x, 31.5f, 0.1f);
+}
+
+TEST(environment, look_up_agrees_with_double_precision) {
+  constexpr int kWidth = 64, kHeight = 32;
+  const Environment environment(coordinates(kWidth, kHeight));
+  RandomStream random(1, RandomPurpose::kTest, 41);
+  for (int i = 0; i < 10000; ++i) {
+    const double y = 1.0 - 2.0 * random.uniform(),
+                 azimuth = 2.0 * std::numbers::pi * (random.uniform() - 0.5);
+    const double r = std::sqrt(1.0 - y * y);
+    const vec3 direction(glm::dvec3(r * std::cos(azimuth), y, r * std::sin(azimuth)));
+    const double column = (0.5 + azimuth / (2.0 * std::numbers::pi)) * kWidth - 0.5;
+    const double row = std::acos(y) / std::numbers::pi * kHeight - 0.5;
+    const vec3 found = environment.radiance(direction);
+    if (column > 0.0 && column < kWidth - 1) {  // elsewhere it runs from the last column to the first
+      ASSERT_NEAR(found.x, column, 2e-4) << y << " " << azimuth;
+    }
+    ASSERT_NEAR(found.y, std::clamp(row, 0.0, kHeight - 1.0), 2e-4) << y << " " << azimuth;
+  }
 }
 
 TEST(environment, mean_radiance_is_over_the_sphere) {

@@ -5,7 +5,7 @@
 // A sanitiser is not ready that early.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
-#define PATINA_VECTOR_CLONES __attribute__((target_clones("arch=skylake-avx512", "default")))
+#define PATINA_VECTOR_CLONES __attribute__((target_clones("avx512f", "default")))
 #else
 #define PATINA_VECTOR_CLONES
 #endif

@@ -73,6 +73,7 @@ struct Frame {
 
 LightGatherer::LightGatherer(const render::Scene& scene, const GatherOptions& options)
     : scene_(scene), options_(options), aims_(static_cast<size_t>(options.num_directions)) {
+  PATINA_CHECK_LE(static_cast<int>(kNumStrategies), options.num_directions);
   directions_.resize(aims_.size());
 }
 

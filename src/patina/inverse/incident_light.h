@@ -21,8 +21,8 @@ struct IncidentLight {
 };
 
 struct GatherOptions {
-  int num_directions = 16;
-  int max_depth = 4;  // path segments after the camera ray, as render::PathOptions counts them
+  int num_directions = 16;  // at least four: one a strategy
+  int max_depth = 4;        // path segments after the camera ray, as render::PathOptions counts them
 };
 
 /// Gathers the light at one point after the other; keeps what all points share. One a thread.

@@ -43,7 +43,7 @@ std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<con
 void trace_cache(LightCache& cache, const render::Scene& scene, const views::ViewSet& views,
                  const std::vector<asset::MaterialMaps>& base_maps, const CacheOptions& options,
                  const Progress& progress) {
-  const GatherOptions gather{std::max(1, options.light_samples), options.max_depth};
+  const GatherOptions gather{options.light_samples, options.max_depth};
   cache.lights_per_pixel = LightGatherer::num_entries(scene, gather);
   cache.samples.resize(cache.pixels.size());
   cache.lights.resize(cache.pixels.size() * static_cast<size_t>(cache.lights_per_pixel));

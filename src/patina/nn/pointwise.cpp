@@ -6,15 +6,8 @@
 #include <vector>
 
 #include "patina/base/parallel.h"
+#include "patina/base/vector_clones.h"
 
-// The loops below are compiled for AVX-512 too and chosen when the program starts. A sanitiser is not ready
-// that early.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define PATINA_CLONES __attribute__((target_clones("avx512f", "default")))
-#else
-#define PATINA_CLONES
-#endif
 #define PATINA_INLINE inline __attribute__((always_inline))
 
 namespace patina::nn {
@@ -133,34 +126,34 @@ PATINA_INLINE void geglu_inline(const T* x, T* y, int64_t rows, int64_t channels
 }
 
 // One function a number type: clones cannot be templates.
-PATINA_CLONES void sums(const float* x, int64_t rows, int64_t channels, const float* pivot, float* sum,
+PATINA_VECTOR_CLONES void sums(const float* x, int64_t rows, int64_t channels, const float* pivot, float* sum,
                         float* square) {
   sums_inline(x, rows, channels, pivot, sum, square);
 }
-PATINA_CLONES void sums(const Bf16* x, int64_t rows, int64_t channels, const float* pivot, float* sum,
+PATINA_VECTOR_CLONES void sums(const Bf16* x, int64_t rows, int64_t channels, const float* pivot, float* sum,
                         float* square) {
   sums_inline(x, rows, channels, pivot, sum, square);
 }
-PATINA_CLONES void affine(const float* x, float* y, int64_t rows, int64_t channels, const float* scale,
+PATINA_VECTOR_CLONES void affine(const float* x, float* y, int64_t rows, int64_t channels, const float* scale,
                           const float* offset, bool activated) {
   affine_inline(x, y, rows, channels, scale, offset, activated);
 }
-PATINA_CLONES void affine(const Bf16* x, Bf16* y, int64_t rows, int64_t channels, const float* scale,
+PATINA_VECTOR_CLONES void affine(const Bf16* x, Bf16* y, int64_t rows, int64_t channels, const float* scale,
                           const float* offset, bool activated) {
   affine_inline(x, y, rows, channels, scale, offset, activated);
 }
-PATINA_CLONES void layer_norm_rows(const float* x, float* y, int64_t rows, int64_t channels,
+PATINA_VECTOR_CLONES void layer_norm_rows(const float* x, float* y, int64_t rows, int64_t channels,
                                    const NormWeights& weights) {
   layer_norm_inline(x, y, rows, channels, weights);
 }
-PATINA_CLONES void layer_norm_rows(const Bf16* x, Bf16* y, int64_t rows, int64_t channels,
+PATINA_VECTOR_CLONES void layer_norm_rows(const Bf16* x, Bf16* y, int64_t rows, int64_t channels,
                                    const NormWeights& weights) {
   layer_norm_inline(x, y, rows, channels, weights);
 }
-PATINA_CLONES void geglu_rows(const float* x, float* y, int64_t rows, int64_t channels) {
+PATINA_VECTOR_CLONES void geglu_rows(const float* x, float* y, int64_t rows, int64_t channels) {
   geglu_inline(x, y, rows, channels);
 }
-PATINA_CLONES void geglu_rows(const Bf16* x, Bf16* y, int64_t rows, int64_t channels) {
+PATINA_VECTOR_CLONES void geglu_rows(const Bf16* x, Bf16* y, int64_t rows, int64_t channels) {
   geglu_inline(x, y, rows, channels);
 }
 
