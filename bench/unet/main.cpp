@@ -141,11 +141,9 @@ int main(int argc, char** argv) {
       options.grid = number();
     else if (flag == "--repeat")
       options.repeat = std::max(1, number());
-    else if (flag == "--threads") {
-      const int threads = number();
-      set_num_threads(threads);
-      at::set_num_threads(threads);
-    } else if (flag == "--f32")
+    else if (flag == "--threads")
+      set_num_threads(number());
+    else if (flag == "--f32")
       options.type = at::kFloat;
     else if (flag == "--out" && i + 1 < argc)
       options.out = argv[++i];
@@ -156,6 +154,8 @@ int main(int argc, char** argv) {
       return 2;
     }
   }
+  // As diffusion::Model does: left to itself LibTorch may take fewer threads than there are processors.
+  at::set_num_threads(num_threads());
   const nlohmann::json result = measure(options);
   std::printf("%s\n", result.dump(1).c_str());
   if (!options.out.empty()) write_file(options.out, result.dump(1) + "\n");
