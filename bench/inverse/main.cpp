@@ -1,7 +1,7 @@
 // How well and how fast inverse rendering finds known textures: an asset's textures are flattened to their
-// means, nine views of the true ones, rendered by the path tracer, are the targets. Writes errors, seconds and
-// memory as JSON after every asset, goes on where it was stopped, draws strips "true | start | recovered", and
-// leaves the first asset's scene for mitsuba_peer.py.
+// means, nine views of the true ones, rendered by the path tracer, are the targets. Writes errors, seconds
+// and memory as JSON after every asset, goes on where it was stopped, draws strips "true | start |
+// recovered", and leaves the first asset's scene for mitsuba_peer.py.
 //
 //   bench_inverse [--shared ../shared] [--resolution 512] [--samples 128] [--iterations 200] [--only NAME]
 //                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]

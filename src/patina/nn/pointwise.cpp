@@ -127,27 +127,27 @@ PATINA_INLINE void geglu_inline(const T* x, T* y, int64_t rows, int64_t channels
 
 // One function a number type: clones cannot be templates.
 PATINA_VECTOR_CLONES void sums(const float* x, int64_t rows, int64_t channels, const float* pivot, float* sum,
-                        float* square) {
+                               float* square) {
   sums_inline(x, rows, channels, pivot, sum, square);
 }
 PATINA_VECTOR_CLONES void sums(const Bf16* x, int64_t rows, int64_t channels, const float* pivot, float* sum,
-                        float* square) {
+                               float* square) {
   sums_inline(x, rows, channels, pivot, sum, square);
 }
 PATINA_VECTOR_CLONES void affine(const float* x, float* y, int64_t rows, int64_t channels, const float* scale,
-                          const float* offset, bool activated) {
+                                 const float* offset, bool activated) {
   affine_inline(x, y, rows, channels, scale, offset, activated);
 }
 PATINA_VECTOR_CLONES void affine(const Bf16* x, Bf16* y, int64_t rows, int64_t channels, const float* scale,
-                          const float* offset, bool activated) {
+                                 const float* offset, bool activated) {
   affine_inline(x, y, rows, channels, scale, offset, activated);
 }
 PATINA_VECTOR_CLONES void layer_norm_rows(const float* x, float* y, int64_t rows, int64_t channels,
-                                   const NormWeights& weights) {
+                                          const NormWeights& weights) {
   layer_norm_inline(x, y, rows, channels, weights);
 }
 PATINA_VECTOR_CLONES void layer_norm_rows(const Bf16* x, Bf16* y, int64_t rows, int64_t channels,
-                                   const NormWeights& weights) {
+                                          const NormWeights& weights) {
   layer_norm_inline(x, y, rows, channels, weights);
 }
 PATINA_VECTOR_CLONES void geglu_rows(const float* x, float* y, int64_t rows, int64_t channels) {
