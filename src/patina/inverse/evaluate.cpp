@@ -18,11 +18,7 @@ constexpr size_t kMaxParts = 4;
 constexpr size_t kPartBytes = size_t{256} << 20;
 
 // How far the stored values of a sample lie beyond their bounds, signed; zero inside.
-struct Overshoot {
-  vec3 base_color{0.0f};
-  float roughness = 0, metallic = 0;
-  vec3 normal{0.0f};
-};
+using Overshoot = MapValues;
 
 // Adds the field's change to `value`, kept within the slot's range; `overshoot` gets what the range cut off.
 void add_change(const FittedMap& map, const asset::BilinearTap& tap, float* value, float* overshoot) {
@@ -77,19 +73,6 @@ const float* slot_gradient(const MapGradient& gradient, Slot slot) {
 float* slot_value(MapValues& values, Slot slot) {
   return const_cast<float*>(slot_gradient(values, slot));
 }
-float* slot_overshoot(Overshoot& overshoot, Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return &overshoot.base_color.x;
-    case Slot::kRoughness:
-      return &overshoot.roughness;
-    case Slot::kMetallic:
-      return &overshoot.metallic;
-    case Slot::kNormal:
-      break;
-  }
-  return &overshoot.normal.x;
-}
 
 }  // namespace
 
@@ -120,7 +103,7 @@ Evaluator::Evaluator(std::span<const FittedMap> fitted, render::BsdfModel model,
 }
 
 Evaluator::CurrentValues Evaluator::current_values(const CacheSample& sample) const {
-  CurrentValues current{sample.base, {}};
+  CurrentValues current{sample.base, zero_gradient()};
   if (sample.point.material >= materials_.size()) return current;
   const MaterialFields& fields = materials_[sample.point.material];
   std::array<asset::BilinearTap, kNumSlots> taps;
@@ -130,7 +113,7 @@ Evaluator::CurrentValues Evaluator::current_values(const CacheSample& sample) co
     const auto layout = static_cast<size_t>(fields.layout[s]);
     if (layout == s) taps[s] = asset::bilinear_tap(fields.map[s]->field.delta, sample.point.uv[s]);
     add_change(*fields.map[s], taps[layout], slot_value(current.values, slot),
-               slot_overshoot(current.overshoot, slot));
+               slot_value(current.overshoot, slot));
   }
   return current;
 }

@@ -1,4 +1,4 @@
-// The light cache: for two jittered points of every pixel that counts, the surface they hit and the light
+// The light cache: for a jittered point of every pixel that counts, the surface it hits and the light
 // that arrives there, traced once and kept in eight bytes a direction. Geometry, cameras and lights never
 // change while textures are fitted, so an iteration shades and differentiates these lists without casting a
 // ray (shade.h).
