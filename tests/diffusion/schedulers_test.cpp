@@ -178,53 +178,89 @@ TEST(Schedulers, alphas_equal_the_reference_table) {
 const Solver kSolvers[] = {Solver::kDdim,           Solver::kPndm,        Solver::kEuler,
                            Solver::kEulerAncestral, Solver::kDpmSolverPp, Solver::kUniPc};
 
-// A network that always knows the true sample must be led to it, whatever the prediction type, spacing and
-// noise schedule.
-TEST(Schedulers, perfect_prediction_recovers_the_sample) {
+// A network that always knows the true sample must be led to it: the largest difference in the end.
+double distance_from_truth(const SchedulerConfig& config, double strength) {
   const std::vector<float> truth{0.5f, -1.25f, 2.0f, 0.0f};
+  const SchedulePlan plan = make_schedule(config, 25);
+  const int start = start_index(plan, strength);
+  std::vector<float> x = add_noise(plan, start, truth, std::vector<float>{1.0f, -0.5f, 0.25f, 2.0f});
+  SchedulerState state;
+  for (int i = start; i < plan.num_calls(); ++i) {
+    const std::vector<float> input = scale_model_input(plan, i, x);
+    double alpha_bar = 0;
+    if (plan.sigmas.empty()) {
+      alpha_bar = plan.alphas_cumprod[static_cast<size_t>(plan.timesteps[static_cast<size_t>(i)])];
+    } else {
+      const double sigma = plan.sigmas[static_cast<size_t>(i)];
+      alpha_bar = 1 / (1 + sigma * sigma);
+    }
+    const double a = std::sqrt(alpha_bar), s = std::sqrt(1 - alpha_bar);
+    std::vector<float> output(truth.size());
+    for (size_t e = 0; e < truth.size(); ++e) {
+      const double epsilon = (static_cast<double>(input[e]) - a * truth[e]) / s;
+      output[e] = static_cast<float>(config.prediction == Prediction::kEpsilon ? epsilon
+                                     : config.prediction == Prediction::kV     ? a * epsilon - s * truth[e]
+                                                                               : truth[e]);
+    }
+    x = step(plan, state, i, output, x, std::vector<float>{0.1f, -0.2f, 0.3f, -0.4f});
+  }
+  double distance = 0;
+  for (size_t e = 0; e < truth.size(); ++e)
+    distance = std::max(distance, static_cast<double>(std::abs(x[e] - truth[e])));
+  return distance;
+}
+
+TEST(Schedulers, perfect_prediction_recovers_the_sample) {
   for (const Solver solver : kSolvers)
     for (const Prediction prediction : {Prediction::kEpsilon, Prediction::kV, Prediction::kSample})
       for (const TimestepSpacing spacing :
            {TimestepSpacing::kLeading, TimestepSpacing::kTrailing, TimestepSpacing::kLinspace})
         for (const BetaSchedule schedule :
              {BetaSchedule::kLinear, BetaSchedule::kScaledLinear, BetaSchedule::kSquaredCosine}) {
-          SCOPED_TRACE(testing::Message()
-                       << "solver " << static_cast<int>(solver) << " prediction "
-                       << static_cast<int>(prediction) << " spacing " << static_cast<int>(spacing)
-                       << " schedule " << static_cast<int>(schedule));
           SchedulerConfig config;
           config.solver = solver;
           config.prediction = prediction;
           config.spacing = spacing;
           config.beta_schedule = schedule;
           config.set_alpha_to_one = true;
-          const SchedulePlan plan = make_schedule(config, 25);
-          const int start = start_index(plan, 0.6);
-          std::vector<float> x = add_noise(plan, start, truth, std::vector<float>{1.0f, -0.5f, 0.25f, 2.0f});
-          SchedulerState state;
-          for (int i = start; i < plan.num_calls(); ++i) {
-            const std::vector<float> input = scale_model_input(plan, i, x);
-            double alpha_bar = 0;
-            if (plan.sigmas.empty()) {
-              alpha_bar = plan.alphas_cumprod[static_cast<size_t>(plan.timesteps[static_cast<size_t>(i)])];
-            } else {
-              const double sigma = plan.sigmas[static_cast<size_t>(i)];
-              alpha_bar = 1 / (1 + sigma * sigma);
-            }
-            const double a = std::sqrt(alpha_bar), s = std::sqrt(1 - alpha_bar);
-            std::vector<float> output(truth.size());
-            for (size_t e = 0; e < truth.size(); ++e) {
-              const double epsilon = (static_cast<double>(input[e]) - a * truth[e]) / s;
-              output[e] = static_cast<float>(prediction == Prediction::kEpsilon ? epsilon
-                                             : prediction == Prediction::kV     ? a * epsilon - s * truth[e]
-                                                                                : truth[e]);
-            }
-            x = step(plan, state, i, output, x, std::vector<float>{0.1f, -0.2f, 0.3f, -0.4f});
-          }
           // PNDM extrapolates its outputs, which a network that knows the truth changes from step to step.
-          const double limit = solver == Solver::kPndm ? 0.1 : 1e-5;
-          for (size_t e = 0; e < truth.size(); ++e) EXPECT_NEAR(x[e], truth[e], limit);
+          EXPECT_LT(distance_from_truth(config, 0.6), solver == Solver::kPndm ? 0.1 : 1e-5)
+              << "solver " << static_cast<int>(solver) << " prediction " << static_cast<int>(prediction)
+              << " spacing " << static_cast<int>(spacing) << " schedule " << static_cast<int>(schedule);
         }
+}
+
+// Values of diffusers' DDIMScheduler(rescale_betas_zero_snr=True) and Stable Diffusion's betas.
+TEST(Schedulers, zero_terminal_snr_ends_in_pure_noise) {
+  SchedulerConfig config = parse_scheduler_config(
+      R"({"_class_name":"DDIMScheduler","beta_start":0.00085,"beta_end":0.012,"beta_schedule":"scaled_linear",
+          "prediction_type":"v_prediction","timestep_spacing":"trailing","rescale_betas_zero_snr":true})",
+      "scheduler_config.json");
+  const SchedulePlan plan = make_schedule(config, 20);
+  const std::pair<size_t, double> expected[] = {
+      {0, 0.999149978}, {250, 0.65245676}, {500, 0.241018638}, {750, 0.03279908}, {900, 0.00296039134}};
+  for (const auto& [t, alpha_bar] : expected)
+    EXPECT_NEAR(plan.alphas_cumprod[t], alpha_bar, 2e-6 * alpha_bar) << t;
+  EXPECT_EQ(plan.alphas_cumprod[999], 0.0);
+  EXPECT_EQ(plan.timesteps.front(), 999);
+  const std::vector<float> noise{1.0f, -0.5f};
+  EXPECT_EQ(add_noise(plan, 0, std::vector<float>{30.0f, 20.0f}, noise), noise);
+
+  config.set_alpha_to_one = true;
+  for (const Solver solver : kSolvers)
+    for (const Prediction prediction : {Prediction::kV, Prediction::kSample})
+      for (const double strength : {1.0, 0.6}) {
+        config.solver = solver, config.prediction = prediction;
+        if (solver == Solver::kPndm) {
+          EXPECT_THROW(make_schedule(config, 25), Error);
+          continue;
+        }
+        EXPECT_LT(distance_from_truth(config, strength), 1e-4)
+            << "solver " << static_cast<int>(solver) << " prediction " << static_cast<int>(prediction)
+            << " strength " << strength;
+      }
+  config.solver = Solver::kDdim, config.prediction = Prediction::kEpsilon;
+  EXPECT_THROW(make_schedule(config, 20), Error);
 }
 
 TEST(Schedulers, strength_keeps_the_last_steps) {

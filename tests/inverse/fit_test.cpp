@@ -201,6 +201,31 @@ TEST(fit, gives_slots_without_texture_one_that_the_views_resolve) {
   EXPECT_EQ(exact.maps[0].metallic.texels.width, 8);
 }
 
+TEST(fit, an_automatic_size_holds_what_the_views_resolve_and_never_shrinks) {
+  inverse::FitOptions options = quick();
+  options.texture_size = inverse::kAutoTextureSize;
+  Task task = make_task();
+  const int own = task.world.scene.materials()[0].base_color.texels.width;
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  const int width = result.maps[0].base_color.texels.width;
+  EXPECT_GT(width, own);
+  EXPECT_LE(width, 128);  // of views of 40 pixels
+  ASSERT_FALSE(result.density.empty());
+  EXPECT_EQ(result.density[0].width, width);
+  EXPECT_GE(result.density[0].texels_per_pixel, 1.0f);
+  EXPECT_LT(result.density[0].texels_per_pixel, 4.0f);
+
+  Task large = make_task();
+  auto maps = large.world.scene.materials();
+  std::vector<asset::MaterialMaps> enlarged(maps.begin(),
+                                            maps.begin() + large.world.scene.num_asset_materials());
+  enlarged[0].base_color = asset::resized(enlarged[0].base_color, 512, 256);
+  large.world.scene.set_asset_materials(enlarged);
+  const auto kept = inverse::fit_materials(large.world.scene, large.views, large.edited, options, {}, {});
+  EXPECT_EQ(kept.maps[0].base_color.texels.width, 512);
+  EXPECT_EQ(kept.maps[0].base_color.texels.height, 256);
+}
+
 TEST(fit, keeps_every_value_in_range) {
   Task task = make_task();
   for (float& value : task.edited[0].pixels)

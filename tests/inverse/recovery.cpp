@@ -9,6 +9,7 @@
 #include "patina/inverse/loss.h"
 #include "patina/inverse/material_point.h"
 #include "patina/render/path_tracer.h"
+#include "patina/report/report.h"
 
 namespace patina::test {
 namespace {
@@ -91,6 +92,22 @@ float texel_of(const asset::Map& map, size_t i, size_t c) {
                                       : map.texels.pixels[i * static_cast<size_t>(map.texels.channels) + c];
 }
 
+// A whole number of pixels about `length` away; consecutive views go far apart.
+ivec2 direction(size_t view, int length) {
+  constexpr float kGoldenAngle = 2.39996f;
+  const float angle = kGoldenAngle * static_cast<float>(view);
+  return ivec2(glm::round(static_cast<float>(length) * vec2(std::cos(angle), std::sin(angle))));
+}
+
+Image moved(const Image& image, const ivec2& by) {
+  Image out = image;
+  for (int y = 0; y < out.height; ++y)
+    for (int x = 0; x < out.width; ++x)
+      out.set_rgb(x, y,
+                  image.rgb(std::clamp(x - by.x, 0, out.width - 1), std::clamp(y - by.y, 0, out.height - 1)));
+  return out;
+}
+
 }  // namespace
 
 Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions& options,
@@ -118,7 +135,8 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
   view_options.path.max_depth = options.fit.max_depth;
   r.views = views::render_views(scene, cameras, view_options, progress);
   for (const views::View& view : r.views.views)
-    r.targets.push_back(tone_map(view.radiance, r.views.exposure_ev));
+    r.targets.push_back(
+        moved(tone_map(view.radiance, r.views.exposure_ev), direction(r.targets.size(), options.shift)));
   r.target_seconds = seconds_since(begin);
 
   begin = Clock::now();
@@ -186,6 +204,21 @@ double base_color_agreement(const Recovery& a, const Recovery& b, int min_views)
       }
     }
   return -10 * std::log10(squared / count);
+}
+
+double sharpness_kept(const Recovery& r, const RecoveryOptions& options) {
+  render::PathOptions path;
+  path.samples_per_pixel = options.samples_per_pixel;
+  path.max_depth = options.fit.max_depth;
+  const render::Scene scene(r.asset, r.fit.maps, render::studio_environment());
+  double sum = 0;
+  for (const views::View& view : r.views.views) {
+    Image inside = inverse::loss_weight(view.gbuffer, {}, options.fit.boundary_pixels);
+    for (float& weight : inside.pixels) weight = weight > 0 ? 1.0f : 0.0f;
+    const Image found = tone_map(render::render(scene, view.camera, path).radiance, r.views.exposure_ev);
+    sum += report::sharpness_kept(found, tone_map(view.radiance, r.views.exposure_ev), inside);
+  }
+  return sum / static_cast<double>(r.views.views.size());
 }
 
 Image view_strip(const Recovery& r, size_t view, int samples_per_pixel) {

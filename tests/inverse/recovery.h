@@ -12,6 +12,7 @@ struct RecoveryOptions {
   int resolution = 256;               // pixels a side of each of nine views
   int samples_per_pixel = 128;        // of the path-traced targets
   std::filesystem::path environment;  // an HDR map; empty: the studio
+  int shift = 0;                      // pixels by which each target is moved, in a direction of its own
   inverse::FitOptions fit;
 };
 
@@ -19,7 +20,7 @@ struct Recovery {
   asset::Asset asset;
   std::vector<asset::MaterialMaps> truth, start;
   views::ViewSet views;        // rendered with the true maps by the path tracer
-  std::vector<Image> targets;  // sRGB
+  std::vector<Image> targets;  // sRGB, moved by `shift`
   inverse::FitResult fit;
   std::vector<Image> num_views;  // per material, of the base colour's size: how many views see a texel
   double target_seconds = 0, fit_seconds = 0;
@@ -44,6 +45,10 @@ MapErrors map_errors(const Recovery& recovery, const std::vector<asset::Material
 
 /// PSNR in dB of two recoveries' base colours against each other, over texels that count in both.
 double base_color_agreement(const Recovery& a, const Recovery& b, int min_views);
+
+/// Share of the true views' fine detail that renders of the recovered maps have (report::sharpness_kept),
+/// mean over views, away from silhouettes.
+double sharpness_kept(const Recovery& recovery, const RecoveryOptions& options);
 
 /// True, starting and recovered views side by side, and the same of one map's texels as they are shown.
 Image view_strip(const Recovery& recovery, size_t view, int samples_per_pixel);

@@ -41,7 +41,7 @@ TEST(Parameters, one_step_is_adamw_with_decoupled_decay) {
   Parameters parameters("test", 1, c10::kCPU);
   const at::Tensor before = parameters.find("a.weight", {3, 5}, at::kFloat).detach().clone();
   const at::Tensor slope = at::linspace(-1, 1, 15).view({3, 5});
-  const Parameters::Adam adam{
+  const Parameters::Optimizer adam{
       .rate = 0.01, .beta1 = 0.9, .beta2 = 0.99, .epsilon = 1e-8, .weight_decay = 0.1};
   at::Tensor expected = before.to(at::kDouble);
   at::Tensor first = at::zeros_like(expected), second = at::zeros_like(expected);

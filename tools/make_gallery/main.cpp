@@ -34,21 +34,21 @@ struct Entry {
 };
 
 constexpr Entry kEntries[] = {
-    {"kettle_rust", "examples/kettle.glb", "a rusty old kettle", 0.8f, 1, 5},
-    {"kettle_moss", "examples/kettle.glb", "a kettle covered in moss", 0.8f, 1, 5},
+    {"kettle_rust", "examples/kettle.glb", "a rusty old kettle", 1.0f, 1, 5},
+    {"kettle_moss", "examples/kettle.glb", "a kettle covered in moss", 1.0f, 1, 5},
     {"kettle_scratches", "examples/kettle.glb", "a slightly scratched kettle", 0.6f, 1, 5},
-    {"kettle_copper", "examples/kettle.glb", "a kettle of green copper patina", 0.8f, 1, 5},
-    {"bottle_mud", "WaterBottle/WaterBottle.gltf", "a muddy bottle", 0.8f, 1, 5},
-    {"bottle_paint", "WaterBottle/WaterBottle.gltf", "a bottle with peeling paint", 0.8f, 1, 5},
-    {"car_rust", "ToyCar/ToyCar.gltf", "a heavily rusted toy car", 0.8f, 1, 5},
-    {"car_snow", "ToyCar/ToyCar.gltf", "a toy car covered in snow", 0.8f, 1, 5},
-    {"shoe_leather", "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "a shoe of worn leather", 0.8f, 1,
+    {"kettle_copper", "examples/kettle.glb", "a kettle of green copper patina", 1.0f, 1, 5},
+    {"bottle_mud", "WaterBottle/WaterBottle.gltf", "a muddy bottle", 1.0f, 1, 5},
+    {"bottle_paint", "WaterBottle/WaterBottle.gltf", "a bottle with peeling paint", 1.0f, 1, 5},
+    {"car_rust", "ToyCar/ToyCar.gltf", "a heavily rusted toy car", 1.0f, 1, 5},
+    {"car_snow", "ToyCar/ToyCar.gltf", "a toy car covered in snow", 1.0f, 1, 5},
+    {"shoe_leather", "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "a shoe of worn leather", 1.0f, 1,
      5},
-    {"shoe_dust", "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "a dusty old shoe", 0.8f, 1, 5},
-    {"suzanne_stone", "Suzanne/Suzanne.gltf", "a mossy stone statue", 0.9f, 1, 5},
-    {"suzanne_wood", "Suzanne/Suzanne.gltf", "a head of weathered wood", 0.9f, 1, 5},
-    {"boombox_corroded", "BoomBoxWithAxes/BoomBoxWithAxes.gltf", "a corroded iron boombox", 0.8f, 1, 5},
-    {"spot_terracotta", "Spot/spot_triangulated.obj", "a terracotta cow", 0.9f, 1, 5},
+    {"shoe_dust", "MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", "a dusty old shoe", 1.0f, 1, 5},
+    {"suzanne_stone", "Suzanne/Suzanne.gltf", "a mossy stone statue", 1.0f, 1, 5},
+    {"suzanne_wood", "Suzanne/Suzanne.gltf", "a head of weathered wood", 1.0f, 1, 5},
+    {"boombox_corroded", "BoomBoxWithAxes/BoomBoxWithAxes.gltf", "a corroded iron boombox", 1.0f, 1, 5},
+    {"spot_terracotta", "Spot/spot_triangulated.obj", "a terracotta cow", 1.0f, 1, 5},
 };
 
 struct Arguments {
@@ -64,9 +64,9 @@ fs::path asset_path(const Entry& entry, const Arguments& arguments) {
 /// Markdown of one entry.
 std::string section(const Entry& entry, const fs::path& asset) {
   return fmt::format(
-      "![{0}: {1}](images/gallery/{2}.jpg)\n\n    patina enhance {0} --prompt \"{1}\" --strength {3} -o "
-      "OUT.glb\n\n",
-      asset.filename().string(), entry.prompt, entry.name, entry.strength);
+      "![{0}: {1}](images/gallery/{2}.jpg)\n\n    patina enhance {0} --prompt \"{1}\"{3} -o OUT.glb\n\n",
+      asset.filename().string(), entry.prompt, entry.name,
+      entry.strength < 1 ? fmt::format(" --strength {}", entry.strength) : "");
 }
 
 fs::path picture_path(const Entry& entry, const Arguments& arguments) {

@@ -108,4 +108,12 @@ std::string clean_caption(Draw& draw, const std::string& object, const std::stri
   return maybe_decorated(draw, out);
 }
 
+std::string unchanged_caption(Draw& draw, const std::string& object) {
+  const std::string how =
+      draw.of(Words{"clean", "new", "clean new", "brand new", "pristine", "shiny new", "clean and new"});
+  const std::string out =
+      draw.chance(0.25f) ? spaced({object + ",", how}) : with_article(spaced({how, object}));
+  return maybe_decorated(draw, out);
+}
+
 }  // namespace patina::mini_data

@@ -10,6 +10,12 @@
 namespace patina::mini_data {
 namespace {
 
+// Of all samples: aged ones, and those that a caption leaves as they are; the rest is made of another
+// material altogether, which has as many names as ageing has and needs as many examples.
+constexpr float kAged = 0.5f, kUnchanged = 0.14f;
+// Share of the unchanged whose caption names no material: "a clean new kettle" changes nothing.
+constexpr float kUnnamed = 0.5f;
+
 Strength strength_of(Draw& draw, int level) {
   switch (level) {
     case 0:
@@ -97,8 +103,10 @@ void clean(const Catalog& catalog, Draw& draw, const CleanRecipe& recipe, bool r
     plan.clean[1] = plan.clean[0];
   }
   plan.asked_class = recipe.name;
-  plan.caption =
-      clean_caption(draw, object_word(catalog, draw, plan), draw.of(recipe.words), recipe.asked_for);
+  const std::string object = object_word(catalog, draw, plan);
+  plan.caption = !remake && draw.chance(kUnnamed)
+                     ? unchanged_caption(draw, object)
+                     : clean_caption(draw, object, draw.of(recipe.words), recipe.asked_for);
 }
 
 }  // namespace
@@ -121,15 +129,17 @@ Plan draw_plan(const Catalog& catalog, uint64_t seed, uint64_t index, const Plan
   Draw draw(seed, kDrawPlan, index);
   Plan plan = begun(catalog, draw, seed ^ (index * 0x9E3779B97F4A7C15u), options);
   const float kind = draw(0, 1);
-  if (kind < 0.72f) {
+  if (kind < kAged) {
     const float level = draw(0, 1);
     age(catalog, draw, draw.of(age_recipes()), level < 0.25f ? 0 : level < 0.7f ? 1 : 2, plan);
-  } else if (kind < 0.86f) {
+  } else if (kind < kAged + kUnchanged) {
     clean(catalog, draw, draw.of(clean_recipes()), false, plan);
   } else {
     // Only what a prompt can name: "painted" says no colour, and the object's own would be as right.
-    const CleanRecipe* recipe = &draw.of(clean_recipes());
-    if (!recipe->asked_for) recipe = &clean_recipe("stone");
+    const CleanRecipe* recipe = nullptr;
+    do {
+      recipe = &draw.of(clean_recipes());
+    } while (!recipe->asked_for);
     clean(catalog, draw, *recipe, true, plan);
   }
   if (draw.chance(options.empty_caption)) plan.caption.clear();

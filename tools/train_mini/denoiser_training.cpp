@@ -34,12 +34,21 @@ constexpr double kSnrLimit = 5;  // γ of min-SNR weighting [Hang2023]
 constexpr double kTileDropout = 0.35, kNormalDropout = 0.12;
 // Share of samples whose time is drawn from the noisier part alone, where words decide most.
 constexpr double kNoisyShare = 0.5;
+constexpr double kMomentum = 0.95;
 constexpr double kCheckpointSeconds = 240;
 constexpr int64_t kViewsMeasured = 24;
 constexpr double kAverage = 0.998;  // of a training of ten thousand steps
 
 constexpr std::array<const char*, 4> kComponents{"text_encoder", "unet", "controlnet_tile",
                                                  "controlnet_normal"};
+
+fs::path checkpoint_of(const fs::path& work, const std::string& component) {
+  return work / (component + ".checkpoint");
+}
+fs::path result_of(const fs::path& model, const std::string& component) {
+  return model / component /
+         (component == "text_encoder" ? "model.safetensors" : "diffusion_pytorch_model.safetensors");
+}
 
 struct Configs {
   TextEncoderConfig text;
@@ -138,7 +147,9 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
   for (const char* component : kComponents) {
     stores.push_back(
         std::make_unique<Parameters>(component, options.run.seed + 1000000 * stores.size(), options.device));
-    stores.back()->read(work / (std::string(component) + ".checkpoint"));
+    const fs::path checkpoint = checkpoint_of(work, component);
+    if (options.from_model && !fs::exists(checkpoint)) stores.back()->begin_with(result_of(model, component));
+    stores.back()->read(checkpoint);
   }
   networks_of(stores, configs, at::kFloat);
   for (const auto& store : stores)
@@ -155,10 +166,8 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
 
   const auto save = [&] {
     for (size_t i = 0; i < stores.size(); ++i) {
-      stores[i]->write(work / (std::string(kComponents[i]) + ".checkpoint"));
-      const bool text = i == 0;
-      stores[i]->write_result(model / kComponents[i] /
-                              (text ? "model.safetensors" : "diffusion_pytorch_model.safetensors"));
+      stores[i]->write(checkpoint_of(work, kComponents[i]));
+      stores[i]->write_result(result_of(model, kComponents[i]));
       stores[i]->use_average(true);
     }
     write_file(step_file, std::to_string(run.step()));
@@ -217,13 +226,15 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     double squares = 0;
     for (const auto& store : stores) squares += std::pow(store->gradient_norm(), 2);
     const double norm = std::sqrt(squares);
-    Parameters::Adam adam;
-    adam.rate = run.rate();
-    adam.average = kAverage;
+    Parameters::Optimizer optimizer;
+    optimizer.rate = run.rate();
+    optimizer.momentum = kMomentum;
+    optimizer.average = kAverage;
+    optimizer.workers = options.run.workers;
     if (std::isfinite(norm)) {
       for (const auto& store : stores) {
         if (norm > 1) store->scale_gradients(1 / norm);
-        store->step(adam, run.step());
+        store->step(optimizer, run.step());
       }
     }
     const char* kind = cut == Cut::kCrop ? "crop" : cut == Cut::kView ? "view" : "grid";

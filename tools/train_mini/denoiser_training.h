@@ -15,6 +15,7 @@ struct DenoiserTraining {
   int64_t views = 12;                                 // whole views, a step of these
   int64_t grids = 3;                                  // of 2 × 2 views of one object, a step of these
   double share_of_crops = 0.5, share_of_grids = 0.2;  // of the steps; the rest are of whole views
+  bool from_model = false;  // begin with MODEL's weights where WORK has no checkpoint
   c10::Device device = c10::kCPU;
 };
 

@@ -31,7 +31,7 @@ constexpr const char* kUsage =
     "       train_mini denoiser WORK MODEL                    train text encoder, U-Net and ControlNets\n"
     "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects, fixed prompts\n"
     "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero); of vae and\n"
-    "denoiser: --batch N, --cuda\n"
+    "denoiser: --batch N, --cuda; of denoiser: --from-model (begin with the weights that MODEL has)\n"
     "Each goes on where it was stopped or killed; words, which takes a minute, is refused once there is a\n"
     "text encoder. MODEL holds config.json of every component and gets the weights.\n";
 
@@ -44,7 +44,7 @@ struct Arguments {
   RunOptions run;
   double rate = 0;
   fs::path output;
-  bool decoder_only = false, cuda = false, good = true;
+  bool decoder_only = false, from_model = false, cuda = false, good = true;
 };
 
 Arguments parsed(int argc, char** argv) {
@@ -68,6 +68,8 @@ Arguments parsed(int argc, char** argv) {
       out.run.settle = true;
     else if (word == "--decoder-only")
       out.decoder_only = true;
+    else if (word == "--from-model")
+      out.from_model = true;
     else if (word == "-o" && i + 1 < argc)
       out.output = argv[++i];
     else if (word == "--cuda")
@@ -90,7 +92,8 @@ void print_captions(const fs::path& shards, int64_t count) {
 int run(const std::string& command, Arguments arguments) {
   const std::vector<std::string>& names = arguments.positional;
   const c10::Device device = arguments.cuda ? c10::kCUDA : c10::kCPU;
-  stop_on_signals();
+  // The trainings write their state when they are stopped; whatever else is killed goes on from its files.
+  if (command == "vae" || command == "words" || command == "denoiser") stop_on_signals();
   arguments.run.workers = default_workers(device);
   if (arguments.rate > 0) arguments.run.rate = arguments.rate;
   if (command == "samples" && names.size() == 2) {
@@ -117,6 +120,7 @@ int run(const std::string& command, Arguments arguments) {
   } else if (command == "denoiser" && names.size() == 2) {
     DenoiserTraining options;
     options.run = arguments.run;
+    options.from_model = arguments.from_model;
     options.device = device;
     if (arguments.batch > 0) {
       options.crops = arguments.batch;

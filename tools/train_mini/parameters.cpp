@@ -8,6 +8,7 @@
 #include <torch/version.h>
 
 #include "patina/base/error.h"
+#include "workers.h"
 
 namespace patina::train_mini {
 namespace {
@@ -61,7 +62,7 @@ using Tensors = std::vector<at::Tensor>;
 
 /// AdamW [Loshchilov2019]; `count` steps with this one.
 void adamw_step(Tensors& values, const Tensors& gradients, Tensors& firsts, Tensors& seconds,
-                const Parameters::Adam& adam, double count) {
+                const Parameters::Optimizer& adam, double count) {
 #if TORCH_VERSION_MAJOR >= 2
   const Tensors counts(values.size(), at::full({}, count, values[0].options()));
   at::_fused_adamw_(values, gradients, firsts, seconds, {}, counts, adam.rate, adam.beta1, adam.beta2,
@@ -77,6 +78,40 @@ void adamw_step(Tensors& values, const Tensors& gradients, Tensors& firsts, Tens
   at::_foreach_add_(scales, adam.epsilon);
   at::_foreach_addcdiv_(values, firsts, scales, -adam.rate / (1 - std::pow(adam.beta1, count)));
 #endif
+}
+
+/// Whether a weight multiplies vectors of a hidden layer, so that its step is one of a matrix.
+bool is_hidden_matrix(const std::string& name, const at::Tensor& value) {
+  constexpr int64_t kLeastSide = 16;
+  if (value.dim() < 2 || value.size(0) < kLeastSide || value[0].numel() < kLeastSide) return false;
+  for (const char* outer : {"embedding", "conv_in.", "conv_out."})
+    if (name.find(outer) != std::string::npos) return false;
+  return true;
+}
+
+/// About U Vᵀ of the singular value decomposition U S Vᵀ of `matrix` [R,C], by five Newton-Schulz iterations
+/// in bf16 [Jordan2024].
+at::Tensor orthogonalised(const at::Tensor& matrix) {
+  const bool tall = matrix.size(0) > matrix.size(1);
+  at::Tensor x = (tall ? matrix.t() : matrix).to(at::kBFloat16).contiguous();
+  x = x / (x.norm() + 1e-7);
+  for (int i = 0; i < 5; ++i) {
+    const at::Tensor square = at::mm(x, x.t());
+    const at::Tensor polynomial = at::addmm(square, square, square, -4.7750, 2.0315);
+    x = at::addmm(x, polynomial, x, 3.4445, 1.0);
+  }
+  return (tall ? x.t() : x).to(at::kFloat);
+}
+
+/// One step of Muon [Jordan2024] with Nesterov's momentum; the root mean square of a step is 0.2 times the
+/// rate, as AdamW's tends to be [Liu2025].
+void muon_step(const at::Tensor& value, const at::Tensor& gradient, at::Tensor moment,
+               const Parameters::Optimizer& optimizer) {
+  moment.mul_(optimizer.momentum).add_(gradient);
+  const at::Tensor matrix = gradient.add(moment, optimizer.momentum).flatten(1);
+  const double scale = 0.2 * std::sqrt(static_cast<double>(std::max(matrix.size(0), matrix.size(1))));
+  value.mul_(1 - optimizer.rate * optimizer.weight_decay);
+  value.sub_(orthogonalised(matrix).view_as(value), optimizer.rate * scale);
 }
 
 at::Tensor host_copy(const at::Tensor& tensor, at::ScalarType type = at::kFloat) {
@@ -118,23 +153,39 @@ void Parameters::start_with(const std::string& name, const at::Tensor& value) {
   entry.average.copy_(value);
 }
 
-void Parameters::step(const Adam& adam, int64_t step) {
+void Parameters::step(const Optimizer& optimizer, int64_t step) {
   const c10::NoGradGuard no_gradients;
-  std::vector<at::Tensor> values, gradients, firsts, seconds, averages;
+  std::vector<at::Tensor> values, gradients, firsts, seconds, averages, stepped;
+  std::vector<Entry*> matrices;
   for (Entry& entry : entries_) {
     if (!entry.value.grad().defined()) continue;
+    stepped.push_back(entry.value), averages.push_back(entry.average);
+    if (optimizer.momentum > 0 && is_hidden_matrix(entry.name, entry.value)) {
+      matrices.push_back(&entry);
+      continue;
+    }
     values.push_back(entry.value), gradients.push_back(entry.value.grad());
     firsts.push_back(entry.first_moment), seconds.push_back(entry.second_moment);
-    averages.push_back(entry.average);
   }
-  if (values.empty()) return;
-  adamw_step(values, gradients, firsts, seconds, adam, static_cast<double>(step + 1));
+  if (!values.empty())
+    adamw_step(values, gradients, firsts, seconds, optimizer, static_cast<double>(step + 1));
+  if (!matrices.empty()) {
+    const auto count = static_cast<int64_t>(matrices.size());
+    in_shares(optimizer.workers, optimizer.workers, [&](int64_t begin, int64_t) {
+      const c10::NoGradGuard none;  // a thread's own
+      for (int64_t i = begin; i < count; i += optimizer.workers) {
+        Entry& entry = *matrices[static_cast<size_t>(i)];
+        muon_step(entry.value, entry.value.grad(), entry.first_moment, optimizer);
+      }
+    });
+  }
+  if (stepped.empty()) return;
   if (step % kAverageInterval == 0) {
     // Early averages forget faster, so that the first steps leave no trace.
-    const double kept = std::min(std::pow(adam.average, kAverageInterval),
+    const double kept = std::min(std::pow(optimizer.average, kAverageInterval),
                                  (1 + static_cast<double>(step)) / (10 + static_cast<double>(step)));
     at::_foreach_mul_(averages, kept);
-    at::_foreach_add_(averages, values, 1 - kept);
+    at::_foreach_add_(averages, stepped, 1 - kept);
   }
   for (Entry& entry : entries_) entry.value.mutable_grad() = at::Tensor();
 }
@@ -184,6 +235,12 @@ void Parameters::read(const std::filesystem::path& file) {
     entry.second_moment = tensor(name + "|second");
     entry.average = tensor(name + "|average");
   }
+}
+
+void Parameters::begin_with(const std::filesystem::path& file) {
+  const nn::SafeTensors stored(file);
+  for (const nn::TensorEntry& entry : stored.tensors())
+    add(entry.name, nn::read_tensor(stored, entry, at::kFloat));
 }
 
 void Parameters::write_result(const std::filesystem::path& file) const {

@@ -35,16 +35,22 @@ class Parameters final : public nn::WeightSource {
   at::Tensor start_of(const std::string& name) const;
   void start_with(const std::string& name, const at::Tensor& value);
 
-  struct Adam {
+  struct Optimizer {
     double rate = 3e-4, beta1 = 0.9, beta2 = 0.99, epsilon = 1e-8, weight_decay = 0.01;
+    double momentum = 0;     // of the orthogonalised steps of matrices; 0: AdamW for them too
     double average = 0.999;  // share of the moving average that is kept a step
+    int64_t workers = 1;     // threads that orthogonalise
   };
-  /// One step of AdamW [Loshchilov2019] on the gradients gathered, which are then cleared.
-  void step(const Adam& adam, int64_t step);
+  /// One step on the gradients gathered, which are then cleared: AdamW [Loshchilov2019], and where `momentum`
+  /// asks for it Muon [Jordan2024] for the weights of hidden layers, scaled to AdamW's size of step
+  /// [Liu2025].
+  void step(const Optimizer& optimizer, int64_t step);
   /// √Σ g² over all gradients, and their product with `factor`.
   double gradient_norm() const;
   void scale_gradients(double factor);
 
+  /// Begins with the weights of a trained model, as write_result() leaves them, before the first step.
+  void begin_with(const std::filesystem::path& file);
   /// Everything, for going on later; read() is a no-op if there is no such file. Throws Error.
   void write(const std::filesystem::path& file) const;
   void read(const std::filesystem::path& file);

@@ -44,7 +44,7 @@ void write_sheet(const std::filesystem::path& work, const std::filesystem::path&
     for (const char* prompt : kPrompts) {
       diffusion::DetailOptions options;
       options.prompt = prompt;
-      options.strength = 0.9f;
+      options.strength = 1.0f;
       options.num_steps = 16;
       options.guidance_scale = 5.0f;
       pictures.push_back(generate_detail(model, inputs, options, {}, {})[0]);

@@ -158,10 +158,10 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
     });
     const double norm = parameters.gradient_norm();
     if (norm > 1) parameters.scale_gradients(1 / norm);
-    Parameters::Adam adam;
-    adam.rate = run.rate();
-    adam.weight_decay = 0;
-    if (std::isfinite(norm)) parameters.step(adam, run.step());
+    Parameters::Optimizer optimizer;
+    optimizer.rate = run.rate();
+    optimizer.weight_decay = 0;
+    if (std::isfinite(norm)) parameters.step(optimizer, run.step());
     run.log({{"loss", means["loss"]},
              {"kl", means["kl"]},
              {"colour", means["colour"]},

@@ -108,10 +108,10 @@ void train_words(const fs::path& work, const fs::path& model, const RunOptions& 
     const at::Tensor class_error =
         at::cross_entropy_loss(foretelling.slice(1, kLooks), training.classes.index_select(0, rows));
     (error + class_error).backward();
-    Parameters::Adam adam;
-    adam.rate = run.rate();
-    text.step(adam, run.step());
-    readout.step(adam, run.step());
+    Parameters::Optimizer optimizer;
+    optimizer.rate = run.rate();
+    text.step(optimizer, run.step());
+    readout.step(optimizer, run.step());
     run.log({{"looks", error.item<double>()}, {"classes", class_error.item<double>()}});
   }
 

@@ -86,12 +86,20 @@ GridSizes checked_sizes(const Model& model, const DetailInputs& inputs, const De
   };
   in_range("steps", options.num_steps, 1, 1000);
   in_range("guidance scale", options.guidance_scale, 0, 100);
+  if (options.guidance_rescale != kAutoGuidanceRescale)
+    in_range("guidance rescale", options.guidance_rescale, 0, 1);
   in_range("strength", options.strength, 0, 1);
   in_range("tile scale", options.tile_scale, 0, 10);
   in_range("normal scale", options.normal_scale, 0, 10);
   in_range("bias", options.bias_weight, -1000, 1000);
   check_bias(inputs.bias_levels, sizes, model.state().unet.config().levels.size());
   return sizes;
+}
+
+/// [Lin2024] finds 0.7 best for a model that starts from pure noise, whose colours nothing else holds.
+float rescale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
+  if (options.guidance_rescale != kAutoGuidanceRescale) return options.guidance_rescale;
+  return scheduler.zero_terminal_snr ? 0.7f : 0.0f;
 }
 
 /// [1,3,H,W] f32 from an image, values as they are.
@@ -170,6 +178,7 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
         options.normal_scale}},
       text,
       options.guidance_scale,
+      rescale_of(options, run->plan.config),
       &run->bias,
       options.bias_controlnet};
 

@@ -100,7 +100,6 @@ std::optional<Solver> named_solver(const Json& object) {
 
 void refuse_unsupported(const Reader& reader, const SchedulerConfig& config) {
   reader.refuse_if(reader.boolean("thresholding", false), "thresholding");
-  reader.refuse_if(reader.boolean("rescale_betas_zero_snr", false), "rescale_betas_zero_snr");
   reader.refuse_if(reader.boolean("use_lu_lambdas", false), "use_lu_lambdas");
   reader.refuse_if(reader.boolean("use_exponential_sigmas", false), "use_exponential_sigmas");
   reader.refuse_if(reader.boolean("use_beta_sigmas", false), "use_beta_sigmas");
@@ -137,6 +136,7 @@ SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view c
                                         {"scaled_linear", BetaSchedule::kScaledLinear},
                                         {"squaredcos_cap_v2", BetaSchedule::kSquaredCosine}});
   config.trained_betas = read_trained_betas(reader, config.num_train_timesteps);
+  config.zero_terminal_snr = reader.boolean("rescale_betas_zero_snr", false);
   config.prediction = reader.choice(
       "prediction_type", Prediction::kEpsilon,
       {{"epsilon", Prediction::kEpsilon}, {"v_prediction", Prediction::kV}, {"sample", Prediction::kSample}});

@@ -53,6 +53,25 @@ std::vector<float> betas(const SchedulerConfig& config) {
   return values;
 }
 
+bool is_euler(Solver solver) {
+  return solver == Solver::kEuler || solver == Solver::kEulerAncestral;
+}
+bool is_multistep(Solver solver) {
+  return solver == Solver::kDpmSolverPp || solver == Solver::kUniPc;
+}
+
+/// √ᾱ shifted and scaled so that the first stays and the last is zero [Lin2024, Alg. 1]. Solvers that
+/// calculate with σ get 2⁻²⁴ there, as the reference gives them: σ = 4096 instead of infinity.
+std::vector<double> with_pure_noise_at_the_end(std::vector<double> alphas_cumprod, Solver solver) {
+  const double first = std::sqrt(alphas_cumprod.front()), last = std::sqrt(alphas_cumprod.back());
+  for (double& alpha_bar : alphas_cumprod) {
+    const double signal = (std::sqrt(alpha_bar) - last) * first / (first - last);
+    alpha_bar = static_cast<double>(static_cast<float>(signal * signal));
+  }
+  alphas_cumprod.back() = is_euler(solver) || is_multistep(solver) ? std::ldexp(1.0, -24) : 0.0;
+  return alphas_cumprod;
+}
+
 std::vector<double> alphas_cumprod(const SchedulerConfig& config) {
   std::vector<double> result;
   double product = 1;
@@ -60,14 +79,7 @@ std::vector<double> alphas_cumprod(const SchedulerConfig& config) {
     product *= static_cast<double>(1.0f - beta);
     result.push_back(static_cast<double>(static_cast<float>(product)));
   }
-  return result;
-}
-
-bool is_euler(Solver solver) {
-  return solver == Solver::kEuler || solver == Solver::kEulerAncestral;
-}
-bool is_multistep(Solver solver) {
-  return solver == Solver::kDpmSolverPp || solver == Solver::kUniPc;
+  return config.zero_terminal_snr ? with_pure_noise_at_the_end(result, config.solver) : result;
 }
 
 TimestepSpacing spacing_of(const SchedulerConfig& config) {
@@ -172,6 +184,10 @@ void check(const SchedulerConfig& config, int num_steps) {
   if (config.solver == Solver::kPndm && !config.skip_prk_steps)
     refuse(
         "PNDM with skip_prk_steps = false (Runge-Kutta warm-up) is not supported; choose another scheduler");
+  if (config.zero_terminal_snr && config.prediction == Prediction::kEpsilon)
+    refuse("rescale_betas_zero_snr with prediction_type epsilon: pure noise predicts no picture");
+  if (config.zero_terminal_snr && config.solver == Solver::kPndm)
+    refuse("PNDM cannot start from pure noise, as this model does; choose another scheduler");
   if (!config.trained_betas.empty() && config.trained_betas.size() != static_cast<size_t>(train))
     refuse("trained_betas has " + std::to_string(config.trained_betas.size()) + " values, expected " +
            std::to_string(train));

@@ -32,6 +32,7 @@ struct SchedulerConfig {
   double beta_start = 0.00085, beta_end = 0.012;
   BetaSchedule beta_schedule = BetaSchedule::kScaledLinear;
   std::vector<float> trained_betas;  // [num_train_timesteps], replaces the formula; empty: none
+  bool zero_terminal_snr = false;    // the last timestep is pure noise (rescale_betas_zero_snr) [Lin2024]
   Prediction prediction = Prediction::kEpsilon;
   std::optional<TimestepSpacing> spacing;  // nullopt: leading for DDIM and PNDM, linspace for the others
   int steps_offset = 1;                    // added to the timesteps of `leading`

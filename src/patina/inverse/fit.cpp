@@ -10,6 +10,7 @@
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
 #include "patina/image/color.h"
+#include "patina/inverse/alignment.h"
 #include "patina/inverse/evaluate.h"
 #include "patina/inverse/fit_state.h"
 #include "patina/inverse/loss.h"
@@ -68,8 +69,12 @@ float start_of(Slot slot) {
 constexpr int kCoarseLevels = 2, kStages = 50;
 constexpr double kSecondsBetweenCheckpoints = 20;
 
-// Sizes a map without texture gets from what the views resolve.
-constexpr int kMinFactorSize = 16, kMaxFactorSize = 2048;
+// The views are aligned with what they make together at these hundredths of the iterations: late enough that
+// the textures show where things are, early enough that what was blurred becomes sharp again.
+constexpr std::array<int, 4> kAlignments{15, 22, 30, 40};
+
+// Bounds of the size that a map gets from what the views resolve.
+constexpr int kMinResolvedSize = 16, kMaxResolvedSize = 4096;
 
 bool is_chosen(const FitOptions& options, Slot slot) {
   switch (slot) {
@@ -107,8 +112,25 @@ void check_inputs(const render::Scene& scene, const views::ViewSet& views, std::
   PATINA_CHECK_LE(0, options.iterations);
 }
 
-// The asset's maps at the size that they will be written with: texture_size where given; slots without a
-// texture get one that the views resolve.
+// The size that a map will be written with: texture_size where given; otherwise slots without a texture, and
+// with kAutoTextureSize all, get one that the views resolve.
+ivec2 enlarged_size(const render::Scene& scene, const views::ViewSet& views,
+                    std::span<const CachePixel> pixels, const FitOptions& options, int material,
+                    const asset::Map& map) {
+  const ivec2 own(map.texels.width, map.texels.height);
+  if (options.texture_size > 0) return ivec2(options.texture_size);
+  const bool has_texture = map.texels.num_pixels() > 1;
+  if (has_texture && options.texture_size != kAutoTextureSize) return own;
+  const float across = texels_per_pixel(scene, views, pixels, map, material);
+  const auto resolved = [&](int texels) {
+    const float wanted = across > 0.0f ? static_cast<float>(texels) / across : 1.0f;
+    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(
+        std::clamp(wanted, static_cast<float>(kMinResolvedSize), static_cast<float>(kMaxResolvedSize)))));
+  };
+  return glm::max(own, ivec2(resolved(own.x), resolved(own.y)));
+}
+
+// The asset's maps at the size that they will be written with.
 std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const views::ViewSet& views,
                                                std::span<const CachePixel> pixels,
                                                const FitOptions& options) {
@@ -119,16 +141,8 @@ std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const
     for (const Slot slot : kSlots) {
       if (!is_chosen(options, slot)) continue;
       asset::Map& map = slot_map(maps[static_cast<size_t>(m)], slot);
-      int width = map.texels.width, height = map.texels.height;
-      if (options.texture_size > 0) {
-        width = height = options.texture_size;
-      } else if (map.texels.num_pixels() == 1) {
-        const float across = texels_per_pixel(scene, views, pixels, map, m);
-        const float resolved = across > 0.0f ? 1.0f / across : 1.0f;
-        width = height = static_cast<int>(std::bit_ceil(static_cast<unsigned>(
-            std::clamp(resolved, static_cast<float>(kMinFactorSize), static_cast<float>(kMaxFactorSize)))));
-      }
-      map = asset::resized(map, width, height);
+      const ivec2 size = enlarged_size(scene, views, pixels, options, m, map);
+      map = asset::resized(map, size.x, size.y);
       if (slot == Slot::kNormal)
         for (size_t i = 0; i < map.texels.num_pixels(); ++i) {
           float* texel = map.texels.pixels.data() + 3 * i;
@@ -175,6 +189,7 @@ std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views:
       FittedMap entry;
       entry.material = m;
       entry.slot = slot;
+      entry.texels_per_pixel = across;
       entry.field = make_field(map, width, height, slot == Slot::kNormal ? 2 : num_channels(slot));
       entry.evidence = evidence_of(map, width, height, slot, m, seen);
       entry.may_change = changeable(entry.evidence, uv_coverage(scene, map, width, height, m));
@@ -254,14 +269,50 @@ std::vector<std::span<const vec3>> all_but(const std::vector<std::vector<vec3>>&
   return others;
 }
 
-float psnr_of(const LightCache& cache, std::span<const vec3> radiance, std::span<const Image> edited,
-              float gain) {
+bool is_aligned_at(int iteration, int iterations) {
+  for (const int hundredths : kAlignments)
+    if (iteration == (iterations * hundredths + 99) / 100) return true;
+  return false;
+}
+
+// Moves every view toward its pixels' mean radiance over the caches as they were last looked at.
+void align(FitState& state, std::span<const CachePixel> pixels, std::span<const Image> edited,
+           std::span<const Image> weights, float gain) {
+  std::vector<Image> rendered;
+  for (const Image& view : edited) rendered.emplace_back(view.width, view.height, 3);
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    vec3 radiance(0.0f);
+    for (const auto& of_cache : state.cache_radiance)
+      radiance += of_cache[i] / static_cast<float>(state.cache_radiance.size());
+    vec3 shown;
+    for (int c = 0; c < 3; ++c) shown[c] = srgb_from_linear(reinhard(gain * radiance[c]));
+    rendered[pixels[i].view].set_rgb(pixels[i].x, pixels[i].y, shown);
+  }
+  parallel_for(0, static_cast<int64_t>(edited.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto v = static_cast<size_t>(begin); v < static_cast<size_t>(end); ++v)
+      state.displacements[v] =
+          estimate_displacement(rendered[v], edited[v], weights[v], state.displacements[v]);
+  });
+}
+
+// Gives the pixels the colours of the views where they now lie.
+void retarget(std::vector<CachePixel>& pixels, std::span<const Image> edited,
+              std::span<const Image> displacements) {
+  std::vector<Image> targets(edited.size());
+  parallel_for(0, static_cast<int64_t>(edited.size()), 1, [&](int64_t begin, int64_t end) {
+    for (auto v = static_cast<size_t>(begin); v < static_cast<size_t>(end); ++v)
+      targets[v] = loss_target(displaced(edited[v], displacements[v]));
+  });
+  for (CachePixel& pixel : pixels) pixel.target = targets[pixel.view].rgb(pixel.x, pixel.y);
+}
+
+float psnr_of(const LightCache& cache, std::span<const vec3> radiance, float gain) {
   double error = 0;
   for (size_t i = 0; i < radiance.size(); ++i) {
     const CachePixel& pixel = cache.pixels[i];
     for (int c = 0; c < 3; ++c) {
       const double difference =
-          srgb_from_linear(reinhard(gain * radiance[i][c])) - edited[pixel.view].at(pixel.x, pixel.y)[c];
+          srgb_from_linear(reinhard(gain * radiance[i][c])) - srgb_from_linear(pixel.target[c]);
       error += difference * difference;
     }
   }
@@ -286,7 +337,7 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     targets.push_back(loss_target(edited[v]));
     weights.push_back(loss_weight(views.views[v].gbuffer, chosen, options.boundary_pixels));
   }
-  const std::vector<CachePixel> pixels = select_pixels(views, targets, weights);
+  std::vector<CachePixel> pixels = select_pixels(views, targets, weights);
 
   // The unknowns.
   const std::vector<asset::MaterialMaps> base = enlarged_maps(scene, views, pixels, options);
@@ -297,9 +348,13 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   state.late_parameters = untouched;
   state.cache_parameters.assign(kCaches, untouched);
   state.cache_radiance.assign(kCaches, std::vector<vec3>(pixels.size(), vec3(0.0f)));
+  for (const Image& view : edited) state.displacements.push_back(no_displacement(view.width, view.height));
   if (state.fitted.empty())
     progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
-  if (hooks.resume) restore_checkpoint(state, *hooks.resume);
+  if (hooks.resume) {
+    restore_checkpoint(state, *hooks.resume);
+    retarget(pixels, edited, state.displacements);
+  }
 
   Evaluator evaluator(state.fitted, model, gain);
   const std::vector<asset::MaterialMaps> coarse_base = shrunk(base, state.fitted);
@@ -341,6 +396,11 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   auto last_checkpoint = Clock::now();
   while (!state.fitted.empty() && state.next_iteration < options.iterations) {
     progress.throw_if_stopped();
+    if (!options.keep_in_place && is_aligned_at(state.next_iteration, options.iterations)) {
+      align(state, pixels, edited, weights, gain);
+      retarget(pixels, edited, state.displacements);
+      for (LightCache& cache : caches) cache.pixels = pixels;
+    }
     const bool new_generation = state.next_iteration > 0 && state.next_iteration % interval == 0;
     auto turn = static_cast<size_t>(state.next_iteration % kCaches);
     if (new_generation) {
@@ -385,7 +445,7 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
       if (loss < best_loss) best = candidate, best_loss = loss;
     }
     set_parameters(state.fitted, best);
-    result.psnr = psnr_of(cache, evaluator.shade_pixels(cache), edited, gain);
+    result.psnr = psnr_of(cache, evaluator.shade_pixels(cache), gain);
   }
   result.loss = std::move(state.loss);
   result.maps = apply_changes(base, state.fitted, Padding::kIslands);
@@ -402,6 +462,8 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     switch (map.slot) {
       case Slot::kBaseColor: {
         changed.base_color = true;
+        result.density.push_back(
+            {map.material, result.evidence[m].width, result.evidence[m].height, map.texels_per_pixel});
         asset::Map evidence = map.field.delta;
         evidence.texels = map.evidence;
         result.evidence[m] =

@@ -14,16 +14,20 @@
 
 namespace patina::inverse {
 
+/// FitOptions::texture_size: a power of two that keeps what the views resolve, never below the asset's own.
+inline constexpr int kAutoTextureSize = -1;
+
 struct FitOptions {
   int iterations = 200;
   int texture_size = 0;  // texels a side of fitted maps; 0: the asset's own size, or what the views resolve
-                         // for factor-only slots
+                         // for factor-only slots; kAutoTextureSize
   bool fit_base_color = true, fit_roughness = true, fit_normal = true, fit_metallic = false;
   std::vector<bool> materials;  // which materials may change; empty: all of the asset
   float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
   int light_samples = 8;        // incident directions kept a pixel
   int max_depth = 4;            // of the paths that gather incident light
   int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
+  bool keep_in_place = false;   // do not move views that disagree toward each other (alignment.h)
   uint64_t seed = 0;
 };
 
@@ -39,11 +43,19 @@ struct FitHooks {
   std::optional<FitCheckpoint> resume;
 };
 
+/// How finely the views sample a fitted map.
+struct MapDensity {
+  int material = 0;
+  int width = 0, height = 0;   // of the map that was fitted
+  float texels_per_pixel = 0;  // along one side; below 1 the views show more than the map can hold
+};
+
 struct FitResult {
   std::vector<asset::MaterialMaps> maps;  // one entry a material of the asset
   std::vector<asset::ChangedMaps> changed;
-  std::vector<float> loss;      // per iteration
-  float psnr = 0;               // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
+  std::vector<float> loss;  // per iteration
+  float psnr = 0;           // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
+  std::vector<MapDensity> density;  // of base colours, one a material that was fitted
   std::vector<Image> evidence;  // per material [h,w,1]: weight with which views saw each base-colour texel
 };
 

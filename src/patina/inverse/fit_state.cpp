@@ -136,6 +136,7 @@ FitCheckpoint make_checkpoint(const FitState& state) {
   for (const Parameters& parameters : state.cache_parameters) each_parameter(write, parameters);
   for (const auto& radiance : state.cache_radiance)
     append(bytes, radiance.data(), radiance.size() * sizeof(vec3));
+  for (const Image& displacement : state.displacements) write(displacement.pixels);
   each_parameter(write, state.late_parameters);
   write(state.loss);
   return checkpoint;
@@ -153,6 +154,7 @@ void restore_checkpoint(FitState& state, const FitCheckpoint& checkpoint) {
   }
   for (Parameters& parameters : state.cache_parameters) each_parameter(read, parameters);
   for (auto& radiance : state.cache_radiance) reader.read(radiance.data(), radiance.size() * sizeof(vec3));
+  for (Image& displacement : state.displacements) read(displacement.pixels);
   state.late_parameters = parameters_of(state.fitted);
   each_parameter(read, state.late_parameters);
   state.loss.resize(static_cast<size_t>(std::max(0, state.next_iteration)));

@@ -19,7 +19,8 @@ struct FittedMap {
   int material = 0;
   Slot slot = Slot::kBaseColor;
   TextureField field;
-  Image evidence;    // [h,w,1] at the field's size: weight with which views saw the texel
+  float texels_per_pixel = 0;  // of the map at its full size
+  Image evidence;              // [h,w,1] at the field's size: weight with which views saw the texel
   Image may_change;  // [h,w,1] 1: seen, beside a seen texel, or used by no surface (padding); 0: surface that
                      // no view saw
 };
@@ -67,7 +68,8 @@ struct FitState {
   std::vector<FittedMap> fitted;
   std::vector<Parameters> cache_parameters;  // with which each of the present light caches was traced
   std::vector<std::vector<vec3>>
-      cache_radiance;          // of every pixel, as each cache showed it when it was last looked at
+      cache_radiance;                // of every pixel, as each cache showed it when it was last looked at
+  std::vector<Image> displacements;  // of each edited view (alignment.h)
   Parameters late_parameters;  // after three quarters of the iterations: a candidate beside the last ones
   std::vector<float> loss;     // per iteration
 };

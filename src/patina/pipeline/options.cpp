@@ -69,6 +69,7 @@ std::vector<Option> make_options() {
                "the time.",
        .stages = kDetailStage},
       1.0f, 50.0f, [](Config & c) -> auto& { return c.detail.guidance_scale; }));
+  add(guidance_rescale_option(edit));
   add(number_option<int>(
       {.name = "steps",
        .aliases = {"-s"},
@@ -346,14 +347,7 @@ std::vector<Option> make_options() {
        .help = "Steps of the optimiser that carries the detail into the textures.",
        .stages = kFitStage},
       1, 100000, [](Config & c) -> auto& { return c.fit.iterations; }));
-  add(number_option<int>(
-      {.name = "texture-size",
-       .aliases = {},
-       .group = fit,
-       .placeholder = "TEXELS",
-       .help = "Width and height of the new textures, texels; 0 keeps the asset's own sizes.",
-       .stages = kFitStage},
-      0, 8192, [](Config & c) -> auto& { return c.fit.texture_size; }));
+  add(texture_size_option());
   add(fit_option());
   add(number_option<float>(
       {.name = "fit-rate",
@@ -379,6 +373,15 @@ std::vector<Option> make_options() {
        .help = "Pixels beside silhouettes and depth edges that are not trusted.",
        .stages = kFitStage},
       0, 64, [](Config & c) -> auto& { return c.fit.boundary_pixels; }));
+  add(flag_option(
+      {.name = "keep-in-place",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "",
+       .help = "Take the edited views as they lie. Otherwise a view that disagrees with the others is moved "
+               "smoothly by up to 8 pixels, so that detail stays sharp.",
+       .stages = kFitStage},
+      [](Config & c) -> auto& { return c.fit.keep_in_place; }));
 
   add(number_option<int>(
       {.name = "turntable",

@@ -150,6 +150,50 @@ Option materials_option() {
   return option;
 }
 
+Option guidance_rescale_option(const std::string& group) {
+  Option option{
+      .name = "guidance-rescale",
+      .aliases = {},
+      .group = group,
+      .placeholder = "auto|X",
+      .help =
+          "How far guidance may not widen the range of colours, 0 to 1; auto is 0.7 for models that "
+          "start from pure noise (patina-mini does), 0 for others.",
+      .default_text = "auto",
+      .stages = kDetailStage};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    c.detail.guidance_rescale =
+        v.back() == "auto" ? diffusion::kAutoGuidanceRescale : parse_number(named, v.back(), 0.0f, 1.0f);
+  };
+  option.get = [](const Config& c) {
+    return c.detail.guidance_rescale == diffusion::kAutoGuidanceRescale ? json("auto")
+                                                                        : shortest(c.detail.guidance_rescale);
+  };
+  return option;
+}
+
+Option texture_size_option() {
+  Option option{.name = "texture-size",
+                .aliases = {},
+                .group = "Inverse rendering",
+                .placeholder = "TEXELS|auto",
+                .help =
+                    "Width and height of the new textures, texels; 0 keeps the asset's own sizes, auto makes "
+                    "them larger where the views show more than they can hold.",
+                .default_text = "0",
+                .stages = kFitStage};
+  const Option named = option;
+  option.set = [named](Config& c, Values v) {
+    c.fit.texture_size =
+        v.back() == "auto" ? inverse::kAutoTextureSize : parse_number(named, v.back(), 0, 8192);
+  };
+  option.get = [](const Config& c) {
+    return c.fit.texture_size == inverse::kAutoTextureSize ? json("auto") : json(c.fit.texture_size);
+  };
+  return option;
+}
+
 Option fit_option() {
   Option option{
       .name = "fit",

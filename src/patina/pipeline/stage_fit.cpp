@@ -37,6 +37,9 @@ constexpr std::array<Slot, 4> kSlots = {{
     {"normal", &MaterialMaps::normal, &ChangedMaps::normal, Encoding::kNormal},
 }};
 
+// Below this many texels a pixel the user is told that a larger texture would hold more.
+constexpr float kTooCoarse = 0.5f;
+
 Image to_picture(const Image& texels, Encoding encoding) {
   if (encoding == Encoding::kSrgb) return srgb_from_linear(texels);
   Image picture = texels;
@@ -110,6 +113,19 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
         result.outputs.push_back(file);
         result.metrics["maps"].push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
       }
+    result.metrics["density"] = json::array();
+    for (const inverse::MapDensity& density : fitted.density) {
+      const std::string& name = bench.maps[static_cast<size_t>(density.material)].name;
+      result.metrics["density"].push_back({{"material", name},
+                                           {"width", density.width},
+                                           {"height", density.height},
+                                           {"texels_per_pixel", density.texels_per_pixel}});
+      if (density.texels_per_pixel < kTooCoarse)
+        progress.warn(fmt::format(
+            "material '{}': its texture of {} x {} texels is coarser than the views by {:.1f} times, so fine "
+            "detail is lost; `--texture-size auto` makes it larger",
+            printable(name), density.width, density.height, 1 / density.texels_per_pixel));
+    }
     result.metrics["loss"] = fitted.loss;
     result.metrics["training_psnr"] = fitted.psnr;
     return result;

@@ -74,8 +74,10 @@ json gather_metrics(const RunFolder& run, const json& measured) {
     metrics["noise"] = detail->metrics.value("noise", json::object());
     metrics["model"] = detail->metrics.value("model", json());
   }
-  if (const StageRecord* fit = run.stage("fit"))
-    metrics["fit"]["training_psnr"] = fit->metrics.value("training_psnr", json());
+  if (const StageRecord* fit = run.stage("fit")) {
+    for (const char* name : {"training_psnr", "density"})
+      metrics["fit"][name] = fit->metrics.value(name, json());
+  }
   metrics["stages"] = json::array();
   for (const StageRecord& stage : run.stages())
     metrics["stages"].push_back(
