@@ -149,8 +149,7 @@ TEST(Detail, options_are_felt) {
   EXPECT_TRUE(differs([](DetailOptions& o) { o.prompt = "a mossy stone"; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.negative_prompt = "blurry"; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.guidance_scale = 1; }));
-  EXPECT_TRUE(differs([](DetailOptions& o) { o.guidance_rescale = 0.7f; }));
-  EXPECT_FALSE(differs([](DetailOptions& o) { o.guidance_rescale = 0; }));  // what auto is for this model
+  EXPECT_FALSE(differs([](DetailOptions& o) { o.guidance_scale = 7.5f; }));  // what auto is for this model
   EXPECT_TRUE(differs([](DetailOptions& o) { o.strength = 0.4f; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.tile_scale = 0; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.normal_scale = 0.5f; }));

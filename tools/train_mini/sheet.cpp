@@ -46,7 +46,6 @@ void write_sheet(const std::filesystem::path& work, const std::filesystem::path&
       options.prompt = prompt;
       options.strength = 1.0f;
       options.num_steps = 16;
-      options.guidance_scale = 5.0f;
       pictures.push_back(generate_detail(model, inputs, options, {}, {})[0]);
     }
   }

@@ -90,16 +90,16 @@ struct DetailInputs {
                                         // condition; empty: tile_views
 };
 
-/// DetailOptions::guidance_rescale: 0.7 for models whose noise schedule ends in pure noise, 0 for others.
-inline constexpr float kAutoGuidanceRescale = -1;
+/// DetailOptions::guidance_scale: 3.5 for models that start from pure noise, whose colours nothing but the
+/// words decides and which guidance soon makes shrill; 7.5 for others.
+inline constexpr float kAutoGuidanceScale = 0;
 
 struct DetailOptions {
   std::string prompt = {}, negative_prompt = {};  // with weights as prompt.h reads them
   int clip_skip = 1;  // 1: the whole text encoder; n leaves out its last n - 1 layers
   int num_steps = 20;
-  float guidance_scale = 7.5f;  // 1: no guidance, one evaluation a step
-  float guidance_rescale = kAutoGuidanceRescale;  // [0,1], Denoiser::guidance_rescale
-  float strength = 1.0f;        // (0,1]: share of the steps that is run [Meng2022]
+  float guidance_scale = kAutoGuidanceScale;  // 1: no guidance, one evaluation a step
+  float strength = 1.0f;                      // (0,1]: share of the steps that is run [Meng2022]
   float tile_scale = 1.0f, normal_scale = 1.0f;
   Scheduler scheduler = Scheduler::kUniPc;
   float bias_weight = 0;  // w; 0: no bias

@@ -86,8 +86,6 @@ GridSizes checked_sizes(const Model& model, const DetailInputs& inputs, const De
   };
   in_range("steps", options.num_steps, 1, 1000);
   in_range("guidance scale", options.guidance_scale, 0, 100);
-  if (options.guidance_rescale != kAutoGuidanceRescale)
-    in_range("guidance rescale", options.guidance_rescale, 0, 1);
   in_range("strength", options.strength, 0, 1);
   in_range("tile scale", options.tile_scale, 0, 10);
   in_range("normal scale", options.normal_scale, 0, 10);
@@ -96,10 +94,9 @@ GridSizes checked_sizes(const Model& model, const DetailInputs& inputs, const De
   return sizes;
 }
 
-/// [Lin2024] finds 0.7 best for a model that starts from pure noise, whose colours nothing else holds.
-float rescale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
-  if (options.guidance_rescale != kAutoGuidanceRescale) return options.guidance_rescale;
-  return scheduler.zero_terminal_snr ? 0.7f : 0.0f;
+float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
+  if (options.guidance_scale != kAutoGuidanceScale) return options.guidance_scale;
+  return scheduler.zero_terminal_snr ? 3.5f : 7.5f;
 }
 
 /// [1,3,H,W] f32 from an image, values as they are.
@@ -167,7 +164,8 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
   // What stays the same over all steps.
   run->bias = {inputs.bias_levels, options.bias_weight, options.bias_scaling == BiasScaling::kPaper};
   std::vector<std::string> prompts{options.prompt};
-  if (options.guidance_scale != 1) prompts.insert(prompts.begin(), options.negative_prompt);
+  const float guidance_scale = guidance_scale_of(options, run->plan.config);
+  if (guidance_scale != 1) prompts.insert(prompts.begin(), options.negative_prompt);
   const at::Tensor text =
       encode_prompts(networks.tokenizer, networks.text_encoder, networks.words, prompts, options.clip_skip);
   run->denoiser = {
@@ -177,8 +175,7 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
        {&networks.controlnet_normal, grid_hint(networks.controlnet_normal, inputs.normal_views, sizes.grid),
         options.normal_scale}},
       text,
-      options.guidance_scale,
-      rescale_of(options, run->plan.config),
+      guidance_scale,
       &run->bias,
       options.bias_controlnet};
 

@@ -38,10 +38,7 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
           .contiguous();
   if (batch == 1) return {out, out, out};
   const at::Tensor unconditional = out.slice(0, 0, 1), conditional = out.slice(0, 1, 2);
-  const at::Tensor guided = unconditional + guidance_scale * (conditional - unconditional);
-  if (guidance_rescale == 0) return {unconditional, conditional, guided};
-  const at::Tensor same_spread = guided * (conditional.std() / guided.std());
-  return {unconditional, conditional, guidance_rescale * same_spread + (1 - guidance_rescale) * guided};
+  return {unconditional, conditional, unconditional + guidance_scale * (conditional - unconditional)};
 }
 
 std::vector<float> sample(const Denoiser& denoiser, const SchedulePlan& plan, SamplerState state,

@@ -27,14 +27,12 @@ struct Guided {
 };
 
 /// The network with everything fixed but latent and time. Classifier-free guidance [Ho2022] runs both prompts
-/// as one batch. Guidance widens the range of values: colours become shrill; the rescaled answer has the
-/// spread it would have without [Lin2024, Sec. 3.4].
+/// as one batch.
 struct Denoiser {
   const UNet* unet = nullptr;
   std::vector<Control> controls;
   at::Tensor text;  // [2,T,D], negative prompt first; [1,T,D] without guidance
   float guidance_scale = 1;
-  float guidance_rescale = 0;  // [0,1]: share by which the guided answer gets the spread of the prompt's own
   const nn::SelfAttentionBias* bias = nullptr;  // null: none
   bool bias_controls = false;                   // whether it acts on the ControlNets too
   nn::Recorder record = {};                     // listens to the U-Net

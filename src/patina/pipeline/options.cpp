@@ -60,16 +60,7 @@ std::vector<Option> make_options() {
        .help = "How far the views may move away from the renders: share of the steps that is run, 0.01 to 1.",
        .stages = kDetailStage},
       0.01f, 1.0f, [](Config & c) -> auto& { return c.detail.strength; }));
-  add(number_option<float>(
-      {.name = "guidance-scale",
-       .aliases = {"--cfg-scale"},
-       .group = edit,
-       .placeholder = "G",
-       .help = "How strongly the prompt acts (classifier-free guidance); 1 switches guidance off and halves "
-               "the time.",
-       .stages = kDetailStage},
-      1.0f, 50.0f, [](Config & c) -> auto& { return c.detail.guidance_scale; }));
-  add(guidance_rescale_option(edit));
+  add(guidance_scale_option(edit));
   add(number_option<int>(
       {.name = "steps",
        .aliases = {"-s"},

@@ -150,25 +150,26 @@ Option materials_option() {
   return option;
 }
 
-Option guidance_rescale_option(const std::string& group) {
+Option guidance_scale_option(const std::string& group) {
   Option option{
-      .name = "guidance-rescale",
-      .aliases = {},
+      .name = "guidance-scale",
+      .aliases = {"--cfg-scale"},
       .group = group,
-      .placeholder = "auto|X",
+      .placeholder = "auto|G",
       .help =
-          "How far guidance may not widen the range of colours, 0 to 1; auto is 0.7 for models that "
-          "start from pure noise (patina-mini does), 0 for others.",
+          "How strongly the prompt acts (classifier-free guidance), 1 to 50; 1 switches guidance off "
+          "and halves the time. auto is 3.5 for models that start from pure noise (patina-mini "
+          "does), 7.5 for others.",
       .default_text = "auto",
       .stages = kDetailStage};
   const Option named = option;
   option.set = [named](Config& c, Values v) {
-    c.detail.guidance_rescale =
-        v.back() == "auto" ? diffusion::kAutoGuidanceRescale : parse_number(named, v.back(), 0.0f, 1.0f);
+    c.detail.guidance_scale =
+        v.front() == "auto" ? diffusion::kAutoGuidanceScale : parse_number(named, v.front(), 1.0f, 50.0f);
   };
   option.get = [](const Config& c) {
-    return c.detail.guidance_rescale == diffusion::kAutoGuidanceRescale ? json("auto")
-                                                                        : shortest(c.detail.guidance_rescale);
+    return c.detail.guidance_scale == diffusion::kAutoGuidanceScale ? json("auto")
+                                                                    : shortest(c.detail.guidance_scale);
   };
   return option;
 }
@@ -186,7 +187,7 @@ Option texture_size_option() {
   const Option named = option;
   option.set = [named](Config& c, Values v) {
     c.fit.texture_size =
-        v.back() == "auto" ? inverse::kAutoTextureSize : parse_number(named, v.back(), 0, 8192);
+        v.front() == "auto" ? inverse::kAutoTextureSize : parse_number(named, v.front(), 0, 8192);
   };
   option.get = [](const Config& c) {
     return c.fit.texture_size == inverse::kAutoTextureSize ? json("auto") : json(c.fit.texture_size);

@@ -13,7 +13,7 @@ Option resolution_option();
 Option preset_option();
 Option exposure_option();
 Option materials_option();
-Option guidance_rescale_option(const std::string& group);
+Option guidance_scale_option(const std::string& group);
 Option texture_size_option();
 Option fit_option();
 Option loras_option(const std::string& group);
