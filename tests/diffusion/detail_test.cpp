@@ -53,7 +53,7 @@ TEST(Detail, without_bias_it_is_the_reference_controlnet_image_to_image) {
   DetailOptions options;
   options.prompt = golden.metadata().at("prompt");
   options.negative_prompt = golden.metadata().at("negative_prompt");
-  options.num_steps = 6;
+  options.num_steps = 6, options.strength = 0.8f;
   options.tile_scale = 0.8f, options.normal_scale = 0.7f;
   options.scheduler = Scheduler::kDdim;
   const std::vector<Image> views = run(inputs, options);

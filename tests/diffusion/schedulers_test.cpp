@@ -234,7 +234,7 @@ TEST(Schedulers, perfect_prediction_recovers_the_sample) {
 TEST(Schedulers, zero_terminal_snr_ends_in_pure_noise) {
   SchedulerConfig config = parse_scheduler_config(
       R"({"_class_name":"DDIMScheduler","beta_start":0.00085,"beta_end":0.012,"beta_schedule":"scaled_linear",
-          "prediction_type":"v_prediction","timestep_spacing":"trailing","rescale_betas_zero_snr":true})",
+          "clip_sample":false,"prediction_type":"v_prediction","timestep_spacing":"trailing","rescale_betas_zero_snr":true})",
       "scheduler_config.json");
   const SchedulePlan plan = make_schedule(config, 20);
   const std::pair<size_t, double> expected[] = {
