@@ -74,7 +74,7 @@ constexpr double kSecondsBetweenCheckpoints = 20;
 constexpr std::array<int, 4> kAlignments{15, 22, 30, 40};
 
 // Bounds of the size that a map gets from what the views resolve.
-constexpr int kMinResolvedSize = 16, kMaxResolvedSize = 4096;
+constexpr int kMinResolvedSize = 16, kMaxResolvedSize = 2048;
 
 bool is_chosen(const FitOptions& options, Slot slot) {
   switch (slot) {
