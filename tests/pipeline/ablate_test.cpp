@@ -154,12 +154,14 @@ class AblateEdits : public testing::Test {
 
 TEST_F(AblateEdits, a_killed_one_continues_and_gives_the_same_numbers) {
   const fs::path broken = folder_->path() / "broken";
-  int num_kills = 0;
-  for (const double share : {0.5, 0.75}) {
+  // How long the whole takes depends on what else the machine does: one that ended before it was killed is
+  // started anew and killed sooner.
+  for (double share = 0.75; share > 0.02; share *= 0.7) {
     const auto result = test::run_process(ablate_command(broken, kOptions), {.kill_after = share * seconds_});
-    num_kills += result.signal != 0;
+    if (result.signal != 0) break;
+    fs::remove_all(broken);
   }
-  EXPECT_GT(num_kills, 0);
+  ASSERT_TRUE(fs::exists(broken)) << "never killed";
   run_ok(ablate_command(broken, kOptions));
   EXPECT_EQ(without_cost(numbers_of(broken).at("steps")), without_cost(numbers_of(whole()).at("steps")));
 }
