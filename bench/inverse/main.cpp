@@ -4,7 +4,8 @@
 // recovered", and leaves the first asset's scene for mitsuba_peer.py.
 //
 // The first asset's targets are also moved against each other by 1, 2 and 4 pixels, and by none, to see how
-// much fine detail conflicting views leave.
+// much fine detail conflicting views leave; and it is fitted with more and fewer views, pixels and texels, to
+// see what each costs. Both at half the resolution.
 //
 //   bench_inverse [--shared ../shared] [--resolution 512] [--samples 128] [--iterations 200] [--only NAME]
 //                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]
@@ -62,6 +63,7 @@ json measured(const test::Recovery& r) {
   const test::MapErrors start = test::map_errors(r, r.start, kMinViews),
                         found = test::map_errors(r, r.fit.maps, kMinViews);
   return {{"base_color_psnr", found.base_color_psnr},
+          {"resolved_psnr", found.resolved_psnr},
           {"roughness_mae", found.roughness_mae},
           {"normal_degrees", found.normal_degrees},
           {"seen_share", found.seen_share},
@@ -98,6 +100,54 @@ json conflicting(const test::RecoveryOptions& options, const fs::path& asset, co
       draw(r, pictures, "moved_" + std::to_string(shift) + (keep_in_place ? "_as_they_lie" : "_aligned"));
     }
   return all;
+}
+
+// Seconds of the first asset's fit, each of views, resolution and texture size changed for itself.
+json cost(const test::RecoveryOptions& options, const fs::path& asset) {
+  const int resolution = options.resolution;
+  struct Setting {
+    const char* changed;
+    int num_views, resolution, texture_size;
+  };
+  const Setting settings[] = {{"views", 4, resolution, 0},           {"views", 9, resolution, 0},
+                              {"views", 16, resolution, 0},          {"resolution", 9, resolution / 2, 0},
+                              {"resolution", 9, resolution, 0},      {"resolution", 9, 2 * resolution, 0},
+                              {"texture_size", 9, resolution, 1024}, {"texture_size", 9, resolution, 2048},
+                              {"texture_size", 9, resolution, 4096}};
+  json all = json::array();
+  for (const Setting& setting : settings) {
+    test::RecoveryOptions changed = options;
+    changed.num_views = setting.num_views;
+    changed.resolution = setting.resolution;
+    changed.fit.texture_size = setting.texture_size;
+    const test::Recovery r = test::recover(asset, changed);
+    all.push_back({{"changed", setting.changed},
+                   {"views", setting.num_views},
+                   {"resolution", setting.resolution},
+                   {"texture_size", r.fit.maps[0].base_color.texels.width},
+                   {"seconds", r.fit_seconds}});
+    std::printf("cost: %2d views of %4d x %4d pixels, textures of %4d texels a side: %.1f s\n",
+                setting.num_views, setting.resolution, setting.resolution,
+                r.fit.maps[0].base_color.texels.width, r.fit_seconds);
+    std::fflush(stdout);
+  }
+  return all;
+}
+
+// The assets' strips of views below each other.
+void stack_strips(const fs::path& folder) {
+  std::vector<Image> strips;
+  for (const char* file : kAssets) {
+    const fs::path strip = folder / (fs::path(file).stem().string() + "_views.png");
+    if (!fs::exists(strip)) return;
+    strips.push_back(read_image(strip));
+  }
+  Image all(strips[0].width, static_cast<int>(strips.size()) * strips[0].height, 3);
+  for (size_t s = 0; s < strips.size(); ++s)
+    for (int y = 0; y < strips[s].height; ++y)
+      for (int x = 0; x < strips[s].width; ++x)
+        all.set_rgb(x, static_cast<int>(s) * strips[s].height + y, strips[s].rgb(x, y));
+  write_image(folder / "all_views.png", all);
 }
 
 void run(const Options& options) {
@@ -138,9 +188,17 @@ void run(const Options& options) {
     report["assets"].push_back(std::move(entry));
     write_file(options.out, report.dump(1) + "\n");
   }
+  stack_strips(options.pictures);
+  if (!options.only.empty()) return;
+  test::RecoveryOptions half = options.recovery;
+  half.resolution /= 2;
+  const fs::path first = options.shared / "assets" / kAssets[0];
   if (!report.contains("conflicting_views")) {
-    report["conflicting_views"] =
-        conflicting(options.recovery, options.shared / "assets" / kAssets[0], options.pictures);
+    report["conflicting_views"] = conflicting(half, first, options.pictures);
+    write_file(options.out, report.dump(1) + "\n");
+  }
+  if (!report.contains("cost")) {
+    report["cost"] = cost(half, first);
     write_file(options.out, report.dump(1) + "\n");
   }
 }

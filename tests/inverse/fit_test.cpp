@@ -1,6 +1,8 @@
 // The fit as a whole: what it finds, what it leaves alone, that it repeats, resumes and stops; and the parts
 // it is made of.
+#include <atomic>
 #include <cmath>
+#include <optional>
 
 #include <gtest/gtest.h>
 
@@ -141,6 +143,70 @@ TEST(fit, resumed_run_gives_the_same_bytes) {
         inverse::fit_materials(again.world.scene, again.views, again.edited, quick(), hooks, {});
     EXPECT_TRUE(all_texels(result) == expected) << "stopped at " << stop_at;
   }
+}
+
+TEST(fit, stopped_at_any_moment_hands_over_its_textures_and_continues_bit_for_bit) {
+  Task whole = make_task();
+  const auto expected =
+      all_texels(inverse::fit_materials(whole.world.scene, whole.views, whole.edited, quick(), {}, {}));
+  // Most of the questions are asked while rays are cast.
+  std::atomic<int> num_asked = 0;
+  Progress counting;
+  counting.stop_requested = [&] { return ++num_asked < 0; };
+  Task counted = make_task();
+  inverse::fit_materials(counted.world.scene, counted.views, counted.edited, quick(), {}, counting);
+  const int all = num_asked;
+  for (const double share : {0.3, 0.5, 0.8}) {
+    Task task = make_task();
+    std::optional<inverse::FitCheckpoint> saved;
+    std::optional<inverse::FitResult> left;
+    inverse::FitHooks hooks;
+    hooks.on_checkpoint = [&](const inverse::FitCheckpoint& checkpoint) { saved = checkpoint; };
+    hooks.on_stop = [&](const inverse::FitResult& so_far) { left = so_far; };
+    num_asked = 0;
+    Progress progress;
+    progress.stop_requested = [&] { return ++num_asked > share * all; };
+    EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, progress),
+                 Error);
+    ASSERT_TRUE(saved.has_value() && left.has_value());
+    EXPECT_GT(saved->next_iteration, 0);
+    EXPECT_LT(saved->next_iteration, quick().iterations);
+    EXPECT_EQ(left->loss.size(), static_cast<size_t>(saved->next_iteration));
+    EXPECT_FALSE(all_texels(*left) == expected);
+
+    Task again = make_task();
+    hooks = {};
+    hooks.resume = saved;
+    const auto result =
+        inverse::fit_materials(again.world.scene, again.views, again.edited, quick(), hooks, {});
+    EXPECT_TRUE(all_texels(result) == expected) << "stopped at " << saved->next_iteration;
+  }
+}
+
+TEST(fit, shows_every_view_and_the_loss_at_the_end) {
+  Task task = make_task();
+  inverse::FitHooks hooks;
+  size_t num_losses = 0;
+  std::vector<Image> rendered;
+  hooks.on_preview = [&](const inverse::FitPreview& preview) {
+    num_losses = preview.loss.size();
+    rendered.assign(preview.rendered.begin(), preview.rendered.end());
+  };
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, {});
+  EXPECT_EQ(num_losses, result.loss.size());
+  ASSERT_EQ(rendered.size(), task.edited.size());
+  // What is shown comes near to what was asked for, where anything is shown.
+  double error = 0, start_error = 0, count = 0;
+  for (size_t v = 0; v < rendered.size(); ++v)
+    for (int y = 0; y < rendered[v].height; ++y)
+      for (int x = 0; x < rendered[v].width; ++x) {
+        const vec3 shown = rendered[v].rgb(x, y), wanted = task.edited[v].rgb(x, y);
+        if (shown == vec3(0.0f)) continue;
+        error += glm::dot(shown - wanted, shown - wanted), count += 1;
+        start_error += glm::dot(wanted, wanted);
+      }
+  ASSERT_GT(count, 0);
+  EXPECT_LT(error, 0.1 * start_error);
 }
 
 TEST(fit, refuses_a_checkpoint_of_other_textures) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <functional>
 
 #include "patina/image/color.h"
 #include "patina/inverse/evidence.h"
@@ -92,6 +93,31 @@ float texel_of(const asset::Map& map, size_t i, size_t c) {
                                       : map.texels.pixels[i * static_cast<size_t>(map.texels.channels) + c];
 }
 
+// A base colour's means over blocks of `side` texels, over those that count; blocks of which less than half
+// counts are black in both maps and count nothing.
+struct Block {
+  vec3 a{0.0f}, b{0.0f};
+  int count = 0;
+};
+std::vector<Block> blocks_of(const asset::Map& a, const asset::Map& b, int side,
+                             const std::function<bool(size_t)>& counts) {
+  const int width = a.texels.width, columns = (width + side - 1) / side,
+            rows = (a.texels.height + side - 1) / side;
+  std::vector<Block> blocks(static_cast<size_t>(columns) * static_cast<size_t>(rows));
+  for (size_t i = 0; i < a.texels.num_pixels(); ++i) {
+    if (!counts(i)) continue;
+    const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
+    Block& block = blocks[static_cast<size_t>(y / side * columns + x / side)];
+    for (size_t c = 0; c < 3; ++c) {
+      block.a[static_cast<int>(c)] += texel_of(a, i, c);
+      block.b[static_cast<int>(c)] += texel_of(b, i, c);
+    }
+    ++block.count;
+  }
+  std::erase_if(blocks, [&](const Block& block) { return 2 * block.count < side * side; });
+  return blocks;
+}
+
 // A whole number of pixels about `length` away; consecutive views go far apart.
 ivec2 direction(size_t view, int length) {
   constexpr float kGoldenAngle = 2.39996f;
@@ -128,6 +154,7 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
                       options.environment.empty() ? render::studio_environment()
                                                   : render::read_environment(options.environment));
   views::OrbitOptions orbit;
+  orbit.num_views = options.num_views;
   orbit.resolution = options.resolution;
   const auto cameras = views::orbit_cameras(asset::bounds(r.asset), orbit);
   views::ViewOptions view_options;
@@ -155,6 +182,7 @@ bool counts(const Recovery& r, size_t material, size_t texel, int min_views) {
 MapErrors map_errors(const Recovery& r, const std::vector<asset::MaterialMaps>& all_maps, int min_views) {
   MapErrors errors;
   double count = 0, all = 0, squared = 0, roughness = 0, metallic = 0, angle = 0;
+  double resolved = 0, num_resolved = 0;
   for (size_t m = 0; m < all_maps.size(); ++m) {
     const size_t num_texels = r.fit.evidence[m].pixels.size();
     all += static_cast<double>(num_texels);
@@ -183,8 +211,19 @@ MapErrors map_errors(const Recovery& r, const std::vector<asset::MaterialMaps>& 
       metallic += std::abs(texel_of(truth.metallic, i, 0) - texel_of(maps.metallic, i, 0));
       angle += std::acos(glm::clamp(glm::dot(glm::normalize(n_true), glm::normalize(n)), -1.0f, 1.0f));
     }
+    for (const inverse::MapDensity& density : r.fit.density) {
+      if (density.material != static_cast<int>(m)) continue;
+      const int side = std::max(1, static_cast<int>(std::lround(2 * density.texels_per_pixel)));
+      for (const Block& block : blocks_of(truth.base_color, maps.base_color, side,
+                                          [&](size_t i) { return counts(r, m, i, min_views); })) {
+        const float share = 1.0f / static_cast<float>(block.count);
+        for (int c = 0; c < 3; ++c, ++num_resolved)
+          resolved += square(srgb_from_linear(share * block.a[c]) - srgb_from_linear(share * block.b[c]));
+      }
+    }
   }
   errors.base_color_psnr = -10 * std::log10(squared / count);
+  errors.resolved_psnr = -10 * std::log10(resolved / num_resolved);
   errors.roughness_mae = roughness / count;
   errors.metallic_mae = metallic / count;
   errors.normal_degrees = glm::degrees(angle / count);

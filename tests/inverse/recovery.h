@@ -9,7 +9,8 @@
 namespace patina::test {
 
 struct RecoveryOptions {
-  int resolution = 256;               // pixels a side of each of nine views
+  int num_views = 9;
+  int resolution = 256;               // pixels a side of each view
   int samples_per_pixel = 128;        // of the path-traced targets
   std::filesystem::path environment;  // an HDR map; empty: the studio
   int shift = 0;                      // pixels by which each target is moved, in a direction of its own
@@ -35,6 +36,7 @@ bool counts(const Recovery& recovery, size_t material, size_t texel, int min_vie
 /// How near maps are to the truth, over the base-colour texels of all materials that count.
 struct MapErrors {
   double base_color_psnr = 0;  // dB, sRGB-encoded values, peak 1
+  double resolved_psnr = 0;    // the same with texels averaged over two pixels of a view: no view shows finer
   double roughness_mae = 0;
   double metallic_mae = 0;
   double normal_degrees = 0;  // mean angle

@@ -7,6 +7,7 @@
 #include "patina/base/files.h"
 #include "patina/report/ablation_page.h"
 #include "patina/report/attention_page.h"
+#include "patina/report/fit_preview.h"
 #include "pictures.h"
 
 namespace patina::report {
@@ -164,6 +165,33 @@ TEST(AttentionPage, panels_mark_query_and_keys_and_brighten_what_the_bias_raises
   const vec3 luminance(0.2126f, 0.7152f, 0.0722f);
   EXPECT_GT(glm::dot(middle(panels[2], 13), luminance), glm::dot(middle(panels[1], 13), luminance) + 0.1f);
   EXPECT_EQ(brightest_attention(figure), 2.0f / 66);
+}
+
+std::string preview_of(const FitPreviewPage& page) {
+  const test::TemporaryFolder folder;
+  write_fit_preview(folder.path() / "preview.html", page);
+  return read_text_file(folder.path() / "preview.html");
+}
+
+TEST(FitPreview, shows_views_and_loss_and_reloads_until_the_fit_is_done) {
+  const std::vector<Image> edited(9, test::noise_picture(32, 32, 1)),
+      rendered(9, test::noise_picture(32, 32, 2));
+  const std::vector<float> loss{1.0f, 0.5f, 0.4f};
+  FitPreviewPage page{.title = kHostile,
+                      .prompt = kHostile,
+                      .negative_prompt = {},
+                      .edited = edited,
+                      .rendered = rendered,
+                      .loss = loss,
+                      .iterations = 4};
+  const std::string running = preview_of(page);
+  expect_balanced(running);
+  expect_self_contained(running);
+  EXPECT_NE(running.find("location.reload"), std::string::npos);
+  EXPECT_NE(running.find("iteration <b>3</b> of 4"), std::string::npos);
+  EXPECT_NE(running.find("class=\"curve\""), std::string::npos);
+  page.iterations = 3;
+  EXPECT_EQ(preview_of(page).find("location.reload"), std::string::npos);
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ float start_of(Slot slot) {
 // The first fiftieth of the iterations moves levels from a quarter of the finest size down, the second from
 // a half, the rest all.
 constexpr int kCoarseLevels = 2, kStages = 50;
-constexpr double kSecondsBetweenCheckpoints = 20;
+constexpr double kSecondsBetweenCheckpoints = 20, kSecondsBetweenPreviews = 5;
 
 // The views are aligned with what they make together at these hundredths of the iterations: late enough that
 // the textures show where things are, early enough that what was blurred becomes sharp again.
@@ -275,9 +275,9 @@ bool is_aligned_at(int iteration, int iterations) {
   return false;
 }
 
-// Moves every view toward its pixels' mean radiance over the caches as they were last looked at.
-void align(FitState& state, std::span<const CachePixel> pixels, std::span<const Image> edited,
-           std::span<const Image> weights, float gain) {
+// The views, sRGB, as the caches showed them when they were last looked at: their pixels' mean radiance.
+std::vector<Image> rendered_views(const FitState& state, std::span<const CachePixel> pixels,
+                                  std::span<const Image> edited, float gain) {
   std::vector<Image> rendered;
   for (const Image& view : edited) rendered.emplace_back(view.width, view.height, 3);
   for (size_t i = 0; i < pixels.size(); ++i) {
@@ -288,6 +288,13 @@ void align(FitState& state, std::span<const CachePixel> pixels, std::span<const 
     for (int c = 0; c < 3; ++c) shown[c] = srgb_from_linear(reinhard(gain * radiance[c]));
     rendered[pixels[i].view].set_rgb(pixels[i].x, pixels[i].y, shown);
   }
+  return rendered;
+}
+
+// Moves every view toward what the caches show of it.
+void align(FitState& state, std::span<const CachePixel> pixels, std::span<const Image> edited,
+           std::span<const Image> weights, float gain) {
+  const std::vector<Image> rendered = rendered_views(state, pixels, edited, gain);
   parallel_for(0, static_cast<int64_t>(edited.size()), 1, [&](int64_t begin, int64_t end) {
     for (auto v = static_cast<size_t>(begin); v < static_cast<size_t>(end); ++v)
       state.displacements[v] =
@@ -318,6 +325,49 @@ float psnr_of(const LightCache& cache, std::span<const vec3> radiance, float gai
   }
   const double mean = error / std::max<double>(1.0, 3.0 * static_cast<double>(radiance.size()));
   return static_cast<float>(mean > 0 ? -10.0 * std::log10(mean) : 100.0);
+}
+
+// What the fitted maps have become, with all that is known of them but the PSNR; takes the losses with it.
+FitResult result_of(FitState& state, const std::vector<asset::MaterialMaps>& base) {
+  FitResult result;
+  result.loss = std::move(state.loss);
+  result.maps = apply_changes(base, state.fitted, Padding::kIslands);
+  result.changed.resize(base.size());
+  result.evidence.resize(base.size());
+  for (size_t m = 0; m < base.size(); ++m) {
+    const Image& texels = result.maps[m].base_color.texels;
+    result.evidence[m] = Image(texels.width, texels.height, 1);
+  }
+  for (const FittedMap& map : state.fitted) {
+    const auto m = static_cast<size_t>(map.material);
+    asset::ChangedMaps& changed = result.changed[m];
+    switch (map.slot) {
+      case Slot::kBaseColor: {
+        changed.base_color = true;
+        result.density.push_back(
+            {map.material, result.evidence[m].width, result.evidence[m].height, map.texels_per_pixel});
+        asset::Map evidence = map.field.delta;
+        evidence.texels = map.evidence;
+        result.evidence[m] =
+            asset::resized(evidence, result.evidence[m].width, result.evidence[m].height).texels;
+        break;
+      }
+      case Slot::kRoughness:
+        changed.roughness = true;
+        break;
+      case Slot::kMetallic:
+        changed.metallic = true;
+        break;
+      case Slot::kNormal:
+        changed.normal = true;
+        break;
+    }
+  }
+  return result;
+}
+
+double seconds_since(Clock::time_point time) {
+  return std::chrono::duration<double>(Clock::now() - time).count();
 }
 
 }  // namespace
@@ -393,21 +443,20 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     set_parameters(state.fitted, current);
   }
 
-  auto last_checkpoint = Clock::now();
-  while (!state.fitted.empty() && state.next_iteration < options.iterations) {
-    progress.throw_if_stopped();
+  const auto iterate = [&] {
+    const bool new_generation = state.next_iteration > 0 && state.next_iteration % interval == 0;
+    auto turn = static_cast<size_t>(state.next_iteration % kCaches);
+    if (new_generation) {
+      // A stop that is asked for while rays are cast leaves the state as the last iteration left it.
+      const int generation = kCaches - 1 + state.next_iteration / interval;
+      turn = static_cast<size_t>(generation % kCaches);
+      renew(generation);
+      state.cache_parameters[turn] = parameters_of(state.fitted);
+    }
     if (!options.keep_in_place && is_aligned_at(state.next_iteration, options.iterations)) {
       align(state, pixels, edited, weights, gain);
       retarget(pixels, edited, state.displacements);
       for (LightCache& cache : caches) cache.pixels = pixels;
-    }
-    const bool new_generation = state.next_iteration > 0 && state.next_iteration % interval == 0;
-    auto turn = static_cast<size_t>(state.next_iteration % kCaches);
-    if (new_generation) {
-      const int generation = kCaches - 1 + state.next_iteration / interval;
-      turn = static_cast<size_t>(generation % kCaches);
-      state.cache_parameters[turn] = parameters_of(state.fitted);
-      renew(generation);
     }
     state.loss.push_back(
         evaluator.evaluate(caches[turn], all_but(state.cache_radiance, turn), state.cache_radiance[turn]));
@@ -416,19 +465,35 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     if (state.next_iteration == options.iterations * 3 / 4)
       state.late_parameters = parameters_of(state.fitted);
     progress.update("fit", state.next_iteration, options.iterations);
+  };
 
-    const std::chrono::duration<double> since = Clock::now() - last_checkpoint;
-    const bool is_due = since.count() > kSecondsBetweenCheckpoints ||
-                        state.next_iteration == options.iterations ||
-                        (hooks.every_iterations > 0 && state.next_iteration % hooks.every_iterations == 0);
-    if (hooks.on_checkpoint && is_due) {
-      hooks.on_checkpoint(make_checkpoint(state));
-      last_checkpoint = Clock::now();
+  auto last_checkpoint = Clock::now(), last_preview = Clock::now();
+  try {
+    while (!state.fitted.empty() && state.next_iteration < options.iterations) {
+      progress.throw_if_stopped();
+      iterate();
+      const bool is_last = state.next_iteration == options.iterations;
+      if (hooks.on_preview && (is_last || seconds_since(last_preview) > kSecondsBetweenPreviews)) {
+        hooks.on_preview({rendered_views(state, pixels, edited, gain), state.loss});
+        last_preview = Clock::now();
+      }
+      const bool is_due = is_last || seconds_since(last_checkpoint) > kSecondsBetweenCheckpoints ||
+                          (hooks.every_iterations > 0 && state.next_iteration % hooks.every_iterations == 0);
+      if (hooks.on_checkpoint && is_due) {
+        hooks.on_checkpoint(make_checkpoint(state));
+        last_checkpoint = Clock::now();
+      }
     }
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInterrupted) {
+      if (hooks.on_checkpoint) hooks.on_checkpoint(make_checkpoint(state));
+      if (hooks.on_stop) hooks.on_stop(result_of(state, base));
+    }
+    throw;
   }
 
   // A cache that no iteration saw judges the end, and the result.
-  FitResult result;
+  float psnr = 0;
   if (!state.fitted.empty()) {
     LightCache &cache = caches[0], &other = caches[1];
     trace(cache, kCaches + kRefreshes + 1);
@@ -445,42 +510,11 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
       if (loss < best_loss) best = candidate, best_loss = loss;
     }
     set_parameters(state.fitted, best);
-    result.psnr = psnr_of(cache, evaluator.shade_pixels(cache), gain);
+    psnr = psnr_of(cache, evaluator.shade_pixels(cache), gain);
   }
-  result.loss = std::move(state.loss);
-  result.maps = apply_changes(base, state.fitted, Padding::kIslands);
+  FitResult result = result_of(state, base);
+  result.psnr = psnr;
   scene.set_asset_materials(result.maps);
-  result.changed.resize(static_cast<size_t>(num_materials));
-  result.evidence.resize(static_cast<size_t>(num_materials));
-  for (int m = 0; m < num_materials; ++m) {
-    const Image& texels = result.maps[static_cast<size_t>(m)].base_color.texels;
-    result.evidence[static_cast<size_t>(m)] = Image(texels.width, texels.height, 1);
-  }
-  for (const FittedMap& map : state.fitted) {
-    const auto m = static_cast<size_t>(map.material);
-    asset::ChangedMaps& changed = result.changed[m];
-    switch (map.slot) {
-      case Slot::kBaseColor: {
-        changed.base_color = true;
-        result.density.push_back(
-            {map.material, result.evidence[m].width, result.evidence[m].height, map.texels_per_pixel});
-        asset::Map evidence = map.field.delta;
-        evidence.texels = map.evidence;
-        result.evidence[m] =
-            asset::resized(evidence, result.evidence[m].width, result.evidence[m].height).texels;
-        break;
-      }
-      case Slot::kRoughness:
-        changed.roughness = true;
-        break;
-      case Slot::kMetallic:
-        changed.metallic = true;
-        break;
-      case Slot::kNormal:
-        changed.normal = true;
-        break;
-    }
-  }
   return result;
 }
 

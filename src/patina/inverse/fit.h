@@ -36,13 +36,6 @@ struct FitCheckpoint {
   int next_iteration = 0;
   std::vector<uint8_t> bytes;
 };
-struct FitHooks {
-  std::function<void(const FitCheckpoint&)>
-      on_checkpoint;         // now and then (at least every 30 s) and at the end
-  int every_iterations = 0;  // more often than that: a checkpoint each this many iterations; 0: by time alone
-  std::optional<FitCheckpoint> resume;
-};
-
 /// How finely the views sample a fitted map.
 struct MapDensity {
   int material = 0;
@@ -57,6 +50,22 @@ struct FitResult {
   float psnr = 0;           // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
   std::vector<MapDensity> density;  // of base colours, one a material that was fitted
   std::vector<Image> evidence;  // per material [h,w,1]: weight with which views saw each base-colour texel
+};
+
+/// How far a fit has come.
+struct FitPreview {
+  std::span<const Image> rendered;  // one a view, sRGB [H,W,3], as the light caches show it: noisy; black
+                                    // where pixels count nothing
+  std::span<const float> loss;  // per iteration so far
+};
+
+struct FitHooks {
+  std::function<void(const FitCheckpoint&)>
+      on_checkpoint;         // now and then (at least every 30 s), when the fit is stopped, and at the end
+  int every_iterations = 0;  // more often than that: a checkpoint each this many iterations; 0: by time alone
+  std::optional<FitCheckpoint> resume;
+  std::function<void(const FitPreview&)> on_preview;  // every five seconds, and at the end
+  std::function<void(const FitResult&)> on_stop;      // the best so far, before Error{kInterrupted} is thrown
 };
 
 /// `edited`: one sRGB [H,W,3] image in [0,1] a view; `scene` holds the starting materials and is left with

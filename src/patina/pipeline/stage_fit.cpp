@@ -12,6 +12,7 @@
 #include "patina/inverse/fit.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/stages.h"
+#include "patina/report/fit_preview.h"
 
 namespace patina::pipeline {
 
@@ -64,11 +65,34 @@ Image to_texels(const Image& picture, Encoding encoding) {
 
 // A material's name as part of a file name: letters, digits, '-', '_'; numbered, so that two materials never
 // share a file.
-std::string texture_file(size_t material, const std::string& name, const char* slot) {
+std::string texture_file(const char* folder, size_t material, const std::string& name, const char* slot) {
   std::string safe;
   for (const char c : name.substr(0, 40))
     safe += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '_';
-  return fmt::format("textures/{:02}_{}_{}.png", material, safe, slot);
+  return fmt::format("{}/{:02}_{}_{}.png", folder, material, safe, slot);
+}
+
+// Where the stage's outputs go, and what a fit shows before it is done: never over the outputs of a run with
+// other options, to which the user may come back.
+constexpr const char *kFolder = "textures", *kPreviewFolder = "preview";
+
+// Writes every map that was fitted to `folder`; says which files and of what (the metric "maps").
+struct WrittenMaps {
+  std::vector<std::string> files;
+  json entries = json::array();
+};
+WrittenMaps write_maps(const inverse::FitResult& fitted, const Workbench& bench, const RunFolder& run,
+                       const char* folder) {
+  WrittenMaps written;
+  for (size_t m = 0; m < fitted.maps.size(); ++m)
+    for (const Slot& slot : kSlots) {
+      if (!(fitted.changed[m].*slot.changed)) continue;
+      const std::string file = texture_file(folder, m, bench.maps[m].name, slot.name);
+      write_image(run.file(file), to_picture((fitted.maps[m].*slot.map).texels, slot.encoding));
+      written.files.push_back(file);
+      written.entries.push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
+    }
+  return written;
 }
 
 std::string fit_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
@@ -98,21 +122,28 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
     };
     if (auto saved = run.load_checkpoint("fit", key))
       hooks.resume = inverse::FitCheckpoint{.next_iteration = saved->step, .bytes = std::move(saved->bytes)};
+    hooks.on_preview = [&](const inverse::FitPreview& preview) {
+      report::write_fit_preview(run.file(std::string(kPreviewFolder) + "/preview.html"),
+                                {.title = bench.asset.path.filename().string(),
+                                 .prompt = config.detail.prompt,
+                                 .negative_prompt = config.detail.negative_prompt,
+                                 .edited = edited,
+                                 .rendered = preview.rendered,
+                                 .loss = preview.loss,
+                                 .iterations = options.iterations});
+    };
+    hooks.on_stop = [&](const inverse::FitResult& so_far) {
+      (void)write_maps(so_far, bench, run, kPreviewFolder);
+    };
     // The fit leaves its result in the scene it is given, so the original is put back afterwards.
     const inverse::FitResult fitted =
         inverse::fit_materials(*bench.scene, views.set, edited, options, hooks, progress);
     bench.scene->set_asset_materials(bench.maps);
 
     RunFolder::StageResult result;
-    result.metrics["maps"] = json::array();
-    for (size_t m = 0; m < fitted.maps.size(); ++m)
-      for (const Slot& slot : kSlots) {
-        if (!(fitted.changed[m].*slot.changed)) continue;
-        const std::string file = texture_file(m, bench.maps[m].name, slot.name);
-        write_image(run.file(file), to_picture((fitted.maps[m].*slot.map).texels, slot.encoding));
-        result.outputs.push_back(file);
-        result.metrics["maps"].push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
-      }
+    WrittenMaps written = write_maps(fitted, bench, run, kFolder);
+    result.outputs = std::move(written.files);
+    result.metrics["maps"] = std::move(written.entries);
     result.metrics["density"] = json::array();
     for (const inverse::MapDensity& density : fitted.density) {
       const std::string& name = bench.maps[static_cast<size_t>(density.material)].name;

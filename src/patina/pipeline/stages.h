@@ -42,7 +42,9 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
                                 RunFolder& run, const Progress& progress,
                                 std::optional<diffusion::Model>* shared_model = nullptr);
 
-/// Carries the edit into the textures → textures/NN_<material>_<slot>.png, textures/loss.json.
+/// Carries the edit into the textures → textures/NN_<material>_<slot>.png; meanwhile preview/preview.html.
+/// A fit that is stopped leaves its textures so far in preview/ and goes on from its checkpoint the next
+/// time.
 struct FittedMaterials {
   std::vector<asset::MaterialMaps> maps;  // one a material of the asset
   std::vector<asset::ChangedMaps> changed;
