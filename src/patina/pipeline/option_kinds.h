@@ -32,10 +32,11 @@ Number parse_number(const Option& option, const std::string& text, Number low, N
   const auto [rest, failure] = std::from_chars(text.data(), end, value);
   const bool in_range = failure == std::errc() && rest == end && value >= low && value <= high;
   if (!in_range)
-    refuse(
-        option,
-        fmt::format("a {} from {} to {}", std::is_integral_v<Number> ? "whole number" : "number", low, high),
-        text);
+    refuse(option,
+           fmt::format("{}a {} from {} to {}",
+                       option.placeholder.find("auto") != std::string::npos ? "auto or " : "",
+                       std::is_integral_v<Number> ? "whole number" : "number", low, high),
+           text);
   return value;
 }
 
