@@ -11,6 +11,8 @@
 //                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]
 #include <sys/resource.h>
 
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -23,6 +25,7 @@
 #include "path_replay_fit.h"
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
+#include "patina/render/path_tracer.h"
 
 namespace {
 
@@ -37,7 +40,8 @@ constexpr const char* kAssets[] = {"WaterBottle/WaterBottle.gltf", "BoomBoxWithA
 constexpr const char* kOtherEnvironment = "assets/hdri/st_fagans_interior_1k.hdr";
 constexpr int kMinViews = 2;             // that see a texel that counts
 constexpr int kShifts[] = {0, 1, 2, 4};  // pixels by which targets are moved against each other
-constexpr int kReplayPaths = 8;          // a pixel: as many as the cache keeps directions
+constexpr int kRenderSamples = 64;
+constexpr int kReplayPaths = 8;  // a pixel: as many as the cache keeps directions
 
 struct Options {
   fs::path shared = "../shared", out = "build/bench/inverse.json", pictures = "build/bench/inverse";
@@ -100,6 +104,32 @@ json conflicting(const test::RecoveryOptions& options, const fs::path& asset, co
       draw(r, pictures, "moved_" + std::to_string(shift) + (keep_in_place ? "_as_they_lie" : "_aligned"));
     }
   return all;
+}
+
+// Seconds and noise of the views' renders: the root of the pixels' mean variance over their mean radiance,
+// where the asset covers a pixel wholly. Mitsuba's share is measured by mitsuba_peer.py.
+json render_noise(const test::Recovery& r, int max_depth) {
+  render::PathOptions path;
+  path.samples_per_pixel = kRenderSamples;
+  path.max_depth = max_depth;
+  const render::Scene scene(r.asset, r.truth, render::studio_environment());
+  double seconds = 0, variance = 0, radiance = 0, count = 0;
+  for (const views::View& view : r.views.views) {
+    const auto begin = std::chrono::steady_clock::now();
+    const render::Render rendered = render::render(scene, view.camera, path);
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    for (size_t i = 0; i < rendered.coverage.pixels.size(); ++i) {
+      if (rendered.coverage.pixels[i] < 1.0f) continue;
+      for (size_t c = 0; c < 3; ++c) {
+        variance += rendered.variance.pixels[3 * i + c];
+        radiance += rendered.radiance.pixels[3 * i + c];
+        count += 1;
+      }
+    }
+  }
+  return {{"samples", kRenderSamples},
+          {"seconds", seconds},
+          {"relative_noise", std::sqrt(variance / count) / (radiance / count)}};
 }
 
 // Seconds of the first asset's fit, each of views, resolution and texture size changed for itself.
@@ -175,6 +205,7 @@ void run(const Options& options) {
     if (file == kAssets[0]) {
       report["seconds_9x512"] = r.fit_seconds;
       report["peak_mb"] = peak_mb();
+      report["render"] = render_noise(r, options.recovery.fit.max_depth);
       bench::export_scene(r, kMinViews, options.pictures / "scene");
       const double replay = bench::path_replay_iteration_seconds(r, options.recovery.fit, kReplayPaths);
       report["reference_over_cache"] = replay * options.recovery.fit.iterations / r.fit_seconds;

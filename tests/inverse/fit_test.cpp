@@ -14,6 +14,7 @@
 #include "patina/inverse/light_packing.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/texture_field.h"
+#include "patina/inverse/unseen.h"
 #include "recovery.h"
 #include "support.h"
 #include "worlds.h"
@@ -251,6 +252,84 @@ TEST(fit, leaves_surface_that_no_view_saw_as_it_was) {
       if (x > 20 && !same) ++moved_right;
     }
   EXPECT_GT(moved_right, 100u);
+}
+
+TEST(fit, fills_surface_that_no_view_saw_with_the_change_beside_it_if_asked) {
+  std::vector<asset::MaterialMaps> before;
+  const auto fitted = [&](bool fill) {
+    Task task = make_task();
+    // The floor's u runs from left to right: its left third is hidden.
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 20; ++x) task.views.views[0].gbuffer.material[static_cast<size_t>(y * 40 + x)] = -1;
+    before = task.world.scene.materials();
+    inverse::FitOptions options = quick();
+    options.texture_size = 32;
+    options.fill_unseen = fill;
+    return inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  };
+  const inverse::FitResult result = fitted(true);
+  const asset::MaterialMaps filled = result.maps[0], kept = fitted(false).maps[0];
+  const auto mean_change = [&](const asset::MaterialMaps& maps, inverse::Slot slot, int from, int to) {
+    const Image start = asset::resized(inverse::slot_map(before[0], slot), 32, 32).texels;
+    const Image& end = inverse::slot_map(maps, slot).texels;
+    double sum = 0;
+    for (int y = 8; y < 24; ++y)
+      for (int x = from; x < to; ++x) sum += *end.at(x, y) - *start.at(x, y);
+    return sum / (16 * (to - from));
+  };
+  for (const auto slot : {inverse::Slot::kBaseColor, inverse::Slot::kRoughness}) {
+    const double seen = mean_change(filled, slot, 20, 30);
+    EXPECT_GT(std::abs(seen), 0.003) << "the edit changes nothing here";
+    for (size_t i = 0; i < result.evidence[0].pixels.size(); ++i) {
+      if (result.evidence[0].pixels[i] < 0.5f) continue;
+      const auto channels = static_cast<size_t>(inverse::num_channels(slot));
+      EXPECT_EQ(inverse::slot_map(filled, slot).texels.pixels[channels * i],
+                inverse::slot_map(kept, slot).texels.pixels[channels * i])
+          << "what is seen stays";
+    }
+    EXPECT_EQ(mean_change(kept, slot, 3, 8), 0.0);
+    EXPECT_GT(mean_change(filled, slot, 3, 8) / seen, 0.2);
+    EXPECT_LT(mean_change(filled, slot, 3, 8) / seen, 5.0);
+  }
+  EXPECT_EQ(filled.normal.texels.pixels, kept.normal.texels.pixels);
+}
+
+// A row of texels a centimetre apart.
+inverse::SurfaceTexels row_of_texels(int count) {
+  inverse::SurfaceTexels surface{Image(count, 1, 1), {}};
+  for (int i = 0; i < count; ++i) {
+    surface.covered.pixels[static_cast<size_t>(i)] = 1.0f;
+    surface.p_world.emplace_back(0.01f * static_cast<float>(i), 0.3f, -2.0f);
+  }
+  return surface;
+}
+
+TEST(unseen, gets_the_change_of_what_is_near_and_never_more) {
+  constexpr int kCount = 256, kSeen = 128;
+  inverse::SurfaceTexels surface = row_of_texels(kCount);
+  surface.covered.pixels[200] = 0.0f;
+  Image change(kCount, 1, 2), evidence(kCount, 1, 1);
+  for (int i = 0; i < kSeen; ++i) {
+    change.at(i, 0)[0] = i < 100 ? -1.0f : 0.5f;
+    change.at(i, 0)[1] = 3.0f;
+    *evidence.at(i, 0) = 1.0f;
+  }
+  change.at(200, 0)[0] = 7.0f;
+  const Image out = inverse::spread_to_unseen(change, evidence, surface);
+  for (int i = 0; i < kCount; ++i) {
+    if (i < kSeen || i == 200) {
+      EXPECT_EQ(out.at(i, 0)[0], change.at(i, 0)[0]) << i;
+      continue;
+    }
+    EXPECT_GE(out.at(i, 0)[0], -1.0f) << i;
+    EXPECT_LE(out.at(i, 0)[0], 0.5f) << i;
+    EXPECT_NEAR(out.at(i, 0)[1], 3.0f, 1e-4f) << i;
+  }
+  EXPECT_GT(out.at(kSeen, 0)[0], 0.2f) << "beside the last seen ones";
+  EXPECT_LT(out.at(kCount - 1, 0)[0], 0.0f) << "far away the mean of all counts";
+
+  std::fill(evidence.pixels.begin(), evidence.pixels.end(), 0.0f);
+  EXPECT_EQ(inverse::spread_to_unseen(change, evidence, surface).pixels, change.pixels) << "nothing was seen";
 }
 
 TEST(fit, gives_slots_without_texture_one_that_the_views_resolve) {

@@ -30,8 +30,14 @@ std::vector<SeenPoint> trace_seen_points(const render::Scene& scene, const views
 Image evidence_of(const asset::Map& map, int width, int height, Slot slot, int material,
                   std::span<const SeenPoint> points);
 
-/// 1 for texels of a width × height texture laid out as `map` that some triangle of the material touches,
-/// else 0. [height,width,1]
-Image uv_coverage(const render::Scene& scene, const asset::Map& map, int width, int height, int material);
+/// The texels of a texture that some triangle of the material touches, and where on the surface they lie; of
+/// several places that share a texel, one.
+struct SurfaceTexels {
+  Image covered;              // [height,width,1]: 1 or 0
+  std::vector<vec3> p_world;  // [height · width], metres; (0,0,0) where nothing is covered
+};
+/// Of a width × height texture laid out as `map`.
+SurfaceTexels surface_texels(const render::Scene& scene, const asset::Map& map, int width, int height,
+                             int material);
 
 }  // namespace patina::inverse

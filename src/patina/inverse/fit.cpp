@@ -14,6 +14,7 @@
 #include "patina/inverse/evaluate.h"
 #include "patina/inverse/fit_state.h"
 #include "patina/inverse/loss.h"
+#include "patina/inverse/unseen.h"
 
 namespace patina::inverse {
 namespace {
@@ -192,7 +193,7 @@ std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views:
       entry.texels_per_pixel = across;
       entry.field = make_field(map, width, height, slot == Slot::kNormal ? 2 : num_channels(slot));
       entry.evidence = evidence_of(map, width, height, slot, m, seen);
-      entry.may_change = changeable(entry.evidence, uv_coverage(scene, map, width, height, m));
+      entry.may_change = changeable(entry.evidence, surface_texels(scene, map, width, height, m).covered);
       fitted.push_back(std::move(entry));
     }
   }
@@ -327,15 +328,29 @@ float psnr_of(const LightCache& cache, std::span<const vec3> radiance, float gai
   return static_cast<float>(mean > 0 ? -10.0 * std::log10(mean) : 100.0);
 }
 
-// What the fitted maps have become, with all that is known of them but the PSNR; takes the losses with it.
-FitResult result_of(FitState& state, const std::vector<asset::MaterialMaps>& base) {
+// Lets the change of every map go on over texels that no view saw. Normals stay: tangent frames turn from
+// place to place, and what is smooth says nothing about them.
+void fill_unseen(const render::Scene& scene, FitState& state) {
+  for (FittedMap& map : state.fitted) {
+    if (map.slot == Slot::kNormal) continue;
+    Image& delta = map.field.delta.texels;
+    const SurfaceTexels surface =
+        surface_texels(scene, map.field.delta, delta.width, delta.height, map.material);
+    delta = spread_to_unseen(delta, map.evidence, surface);
+    for (size_t i = 0; i < surface.p_world.size(); ++i)
+      if (surface.covered.pixels[i] > 0.0f) map.evidence.pixels[i] = map.may_change.pixels[i] = 1.0f;
+  }
+}
+
+// What the fitted maps have become, with all that is known of them but the PSNR. The end of `state`.
+FitResult result_of(const render::Scene& scene, FitState& state, const std::vector<asset::MaterialMaps>& base,
+                    const FitOptions& options) {
   FitResult result;
   result.loss = std::move(state.loss);
-  result.maps = apply_changes(base, state.fitted, Padding::kIslands);
   result.changed.resize(base.size());
   result.evidence.resize(base.size());
   for (size_t m = 0; m < base.size(); ++m) {
-    const Image& texels = result.maps[m].base_color.texels;
+    const Image& texels = base[m].base_color.texels;
     result.evidence[m] = Image(texels.width, texels.height, 1);
   }
   for (const FittedMap& map : state.fitted) {
@@ -363,6 +378,8 @@ FitResult result_of(FitState& state, const std::vector<asset::MaterialMaps>& bas
         break;
     }
   }
+  if (options.fill_unseen) fill_unseen(scene, state);
+  result.maps = apply_changes(base, state.fitted, Padding::kIslands);
   return result;
 }
 
@@ -487,7 +504,7 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kInterrupted) {
       if (hooks.on_checkpoint) hooks.on_checkpoint(make_checkpoint(state));
-      if (hooks.on_stop) hooks.on_stop(result_of(state, base));
+      if (hooks.on_stop) hooks.on_stop(result_of(scene, state, base, options));
     }
     throw;
   }
@@ -512,7 +529,7 @@ FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::
     set_parameters(state.fitted, best);
     psnr = psnr_of(cache, evaluator.shade_pixels(cache), gain);
   }
-  FitResult result = result_of(state, base);
+  FitResult result = result_of(scene, state, base, options);
   result.psnr = psnr;
   scene.set_asset_materials(result.maps);
   return result;

@@ -27,7 +27,9 @@ struct FitOptions {
   int light_samples = 8;        // incident directions kept a pixel
   int max_depth = 4;            // of the paths that gather incident light
   int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
-  bool keep_in_place = false;   // do not move views that disagree toward each other (alignment.h)
+  bool fill_unseen =
+      false;  // texels that no view saw get the change around them (unseen.h), not only padding
+  bool keep_in_place = false;  // do not move views that disagree toward each other (alignment.h)
   uint64_t seed = 0;
 };
 
@@ -56,7 +58,7 @@ struct FitResult {
 struct FitPreview {
   std::span<const Image> rendered;  // one a view, sRGB [H,W,3], as the light caches show it: noisy; black
                                     // where pixels count nothing
-  std::span<const float> loss;  // per iteration so far
+  std::span<const float> loss;      // per iteration so far
 };
 
 struct FitHooks {

@@ -364,6 +364,17 @@ std::vector<Option> make_options() {
        .help = "Pixels beside silhouettes and depth edges that are not trusted.",
        .stages = kFitStage},
       0, 64, [](Config & c) -> auto& { return c.fit.boundary_pixels; }));
+  const Names<bool> unseen = {{"keep", false}, {"fill", true}};
+  add(choice_option<bool>(
+      {.name = "unseen",
+       .aliases = {},
+       .group = fit,
+       .placeholder = "",
+       .help = "Surface that no view sees: keep it as it is, or fill it with the change of base colour, "
+               "roughness "
+               "and metallic around it, smoothly.",
+       .stages = kFitStage},
+      unseen, [](Config & c) -> auto& { return c.fit.fill_unseen; }));
   add(flag_option(
       {.name = "keep-in-place",
        .aliases = {},
