@@ -38,8 +38,8 @@ json coverage_metrics(const Workbench& bench, const Progress& progress, std::vec
   const float seen = views::seen_share(*bench.scene, bench.cameras);
   if (seen < 0.85f) {
     warnings.push_back(
-        fmt::format("The views see {:.0f} % of the surface; what no view sees stays as it was. "
-                    "More views or several elevations (--views 16, --elevation -20 20 50) see more.",
+        fmt::format("The views see {:.0f} % of the surface. More views or several elevations (--views 16, "
+                    "--elevation -20 20 50) see more; what no view sees is treated as --unseen says.",
                     100 * seen));
     progress.warn(warnings.back());
   }
