@@ -224,12 +224,12 @@ void run(const Options& options) {
   test::RecoveryOptions half = options.recovery;
   half.resolution /= 2;
   const fs::path first = options.shared / "assets" / kAssets[0];
-  if (!report.contains("conflicting_views")) {
-    report["conflicting_views"] = conflicting(half, first, options.pictures);
-    write_file(options.out, report.dump(1) + "\n");
-  }
   if (!report.contains("cost")) {
     report["cost"] = cost(half, first);
+    write_file(options.out, report.dump(1) + "\n");
+  }
+  if (!report.contains("conflicting_views")) {
+    report["conflicting_views"] = conflicting(half, first, options.pictures);
     write_file(options.out, report.dump(1) + "\n");
   }
 }
