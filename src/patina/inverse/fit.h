@@ -27,9 +27,8 @@ struct FitOptions {
   int light_samples = 8;        // incident directions kept a pixel
   int max_depth = 4;            // of the paths that gather incident light
   int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
-  bool fill_unseen =
-      false;  // texels that no view saw get the change around them (unseen.h), not only padding
-  bool keep_in_place = false;  // do not move views that disagree toward each other (alignment.h)
+  bool fill_unseen = true;      // texels that no view saw get the change around them (unseen.h)
+  bool keep_in_place = false;   // do not move views that disagree toward each other (alignment.h)
   uint64_t seed = 0;
 };
 
@@ -38,6 +37,7 @@ struct FitCheckpoint {
   int next_iteration = 0;
   std::vector<uint8_t> bytes;
 };
+
 /// How finely the views sample a fitted map.
 struct MapDensity {
   int material = 0;

@@ -42,8 +42,8 @@ constexpr std::array kMeasures{
             {0.9, 1},
             {0.7, 1},
             "90 % or more",
-            "Share of the surface that at least one view sees. What no view sees keeps its old texture, or "
-            "takes the change around it smoothly (--unseen)."},
+            "Share of the surface that at least one view sees. What no view sees takes the change around "
+            "it, smoothly, or keeps its old texture (--unseen)."},
     Measure{
         "/consistency/edit_correlation",
         "Views agree, correlation",
