@@ -6,7 +6,7 @@ namespace patina {
 
 void Progress::throw_if_stopped() const {
   if (stop_requested && stop_requested())
-    throw Error(ErrorCode::kInterrupted, "", "stopped at the user's request");
+    throw Error(ErrorCode::kInterrupted, "", "stopped; the same command goes on from here");
 }
 
 }  // namespace patina

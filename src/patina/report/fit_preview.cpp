@@ -1,5 +1,6 @@
 #include "patina/report/fit_preview.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <fmt/format.h>
@@ -16,12 +17,22 @@ namespace {
 constexpr int kMaxViews = 4, kTileWidth = 256;
 constexpr const char* kReload = "setTimeout(() => location.reload(), 5000);";
 
+// Pixels that the fit does not look at are black; shown so, they would hide the object's edges.
+Image on_grey(Image image) {
+  for (size_t i = 0; i < image.num_pixels(); ++i) {
+    float* pixel = image.pixels.data() + 3 * i;
+    if (pixel[0] == 0.0f && pixel[1] == 0.0f && pixel[2] == 0.0f) std::fill_n(pixel, 3, 0.5f);
+  }
+  return image;
+}
+
 // Some of the views, evenly spread: what is wanted above, what there is below.
 Image pairs_of_views(const FitPreviewPage& page) {
   const size_t count = std::min<size_t>(kMaxViews, page.edited.size());
   std::vector<Image> tiles;
-  for (const std::span<const Image> row : {page.edited, page.rendered})
-    for (size_t i = 0; i < count; ++i) tiles.push_back(row[i * row.size() / count]);
+  for (size_t i = 0; i < count; ++i) tiles.push_back(page.edited[i * page.edited.size() / count]);
+  for (size_t i = 0; i < count; ++i)
+    tiles.push_back(on_grey(page.rendered[i * page.rendered.size() / count]));
   return contact_sheet(tiles, static_cast<int>(count), kTileWidth);
 }
 
