@@ -93,8 +93,8 @@ float texel_of(const asset::Map& map, size_t i, size_t c) {
                                       : map.texels.pixels[i * static_cast<size_t>(map.texels.channels) + c];
 }
 
-// A base colour's means over blocks of `side` texels, over those that count; blocks of which less than half
-// counts are black in both maps and count nothing.
+// Sums of two base colours, linear, over blocks of side × side texels, over those that count; blocks of which
+// less than half counts are left out.
 struct Block {
   vec3 a{0.0f}, b{0.0f};
   int count = 0;

@@ -371,8 +371,7 @@ std::vector<Option> make_options() {
        .group = fit,
        .placeholder = "",
        .help = "Surface that no view sees: keep it as it is, or fill it with the change of base colour, "
-               "roughness "
-               "and metallic around it, smoothly.",
+               "roughness and metallic around it, smoothly.",
        .stages = kFitStage},
       unseen, [](Config & c) -> auto& { return c.fit.fill_unseen; }));
   add(flag_option(

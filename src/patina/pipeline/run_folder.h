@@ -4,9 +4,8 @@
 //   config.json          every option's value, version, asset
 //   stages.json          per stage: the key of its inputs, its outputs, seconds, peak memory, metrics
 //   views/  detail/  textures/  metrics.json  report.html  turntable.webp
-//   preview/             preview.html, while textures are fitted: what they show so far and the loss, anew
-//   every
-//                        few seconds; the textures of a fit that was stopped
+//   preview/             preview.html, while textures are fitted: what they show so far and the loss;
+//                        the textures of a fit that was stopped
 #pragma once
 
 #include <chrono>
