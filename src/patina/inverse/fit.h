@@ -67,7 +67,7 @@ struct FitHooks {
   int every_iterations = 0;  // more often than that: a checkpoint each this many iterations; 0: by time alone
   std::optional<FitCheckpoint> resume;
   std::function<void(const FitPreview&)> on_preview;  // every five seconds, and at the end
-  std::function<void(const FitResult&)> on_stop;      // as far as it came, before Error{kInterrupted} is thrown
+  std::function<void(const FitResult&)> on_stop;  // as far as it came, before Error{kInterrupted} is thrown
 };
 
 /// `edited`: one sRGB [H,W,3] image in [0,1] a view; `scene` holds the starting materials and is left with
