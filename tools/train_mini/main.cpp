@@ -62,6 +62,8 @@ Arguments parsed(int argc, char** argv) {
       number(out.batch);
     else if (word == "--minutes")
       number(out.run.minutes);
+    else if (word == "--seed")
+      number(out.run.seed);
     else if (word == "--rate")
       number(out.rate);
     else if (word == "--settle")
