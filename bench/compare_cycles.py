@@ -54,6 +54,7 @@ def main():
              arguments.samples, FOV_DEGREES, *eye, *target])
         if not cycles.exists():
             sys.exit(f"Blender wrote no {cycles}:\n{log[-2000:]}")
+        measured = json.loads(next(line for line in log.splitlines() if line.startswith("measured "))[len("measured "):])
         for model in ("gltf", "principled"):
             picture = [] if model != "gltf" else ["--picture", out / f"cycles_{name}.png"]
             numbers = out / f"cycles_{name}_{model}.json"
@@ -61,7 +62,11 @@ def main():
                  "--eye", *eye, "--target", *target, "--fov", FOV_DEGREES, "--size", arguments.size, "--samples",
                  arguments.samples, "--depth", DEPTH, "--exposure", EXPOSURE_EV, "--reference", cycles, "--report", numbers, *picture,
                  *(["--principled"] if model == "principled" else [])])
-            report[f"{name}_{model}"] = json.loads(numbers.read_text())
+            found = json.loads(numbers.read_text()) | measured
+            # Noise falls with the root of the samples, so time times variance is what equal noise costs.
+            found["cycles_over_patina"] = (found["seconds_of_cycles"] * found["relative_noise_of_cycles"] ** 2
+                                           / (found["seconds"] * found["relative_noise_of_patina"] ** 2))
+            report[f"{name}_{model}"] = found
             numbers.unlink()
     (out / "cycles.json").write_text(json.dumps(report, indent=2) + "\n")
     print(json.dumps(report, indent=2))

@@ -1,8 +1,13 @@
 # Run inside Blender: renders one view of a glTF file with Cycles, set up to compute what patina's path tracer computes.
 #   blender -b --factory-startup -P cycles_view.py -- ASSET HDR OUT.exr SIZE SAMPLES FOV_DEGREES EX EY EZ TX TY TZ
-# Eye and target are in glTF's axes (Y up); Blender's importer turns them into Z up.
+# Eye and target are in glTF's axes (Y up); Blender's importer turns them into Z up. A second render with another seed, the scene already built,
+# gives seconds and noise, printed as a line of JSON after "measured".
+import json
 import math
+import os
 import sys
+import tempfile
+import time
 
 import bpy
 import numpy
@@ -74,4 +79,16 @@ settings = scene.render.image_settings
 settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
 scene.view_settings.view_transform = "Raw"
 scene.render.filepath = out
+scene.render.use_persistent_data = True
 bpy.ops.render.render(write_still=True)
+
+cycles.seed = 1
+with tempfile.TemporaryDirectory() as folder:
+    scene.render.filepath = os.path.join(folder, "again.exr")
+    begin = time.perf_counter()
+    bpy.ops.render.render(write_still=True)
+    seconds = time.perf_counter() - begin
+    first, second = (numpy.array(bpy.data.images.load(path).pixels[:]).reshape(-1, 4) for path in (out, scene.render.filepath))
+whole = numpy.minimum(first[:, 3], second[:, 3]) >= 1 - 1e-6
+variance = ((first - second)[whole, :3] ** 2).mean() / 2
+print("measured " + json.dumps({"seconds_of_cycles": seconds, "relative_noise_of_cycles": float(numpy.sqrt(variance) / first[whole, :3].mean())}))

@@ -40,8 +40,10 @@ double camera_rays_per_second(const render::Scene& scene, const render::Camera& 
   return static_cast<double>(rays) / seconds_since(start);
 }
 
-/// How a render differs from a reference over the pixels that the asset covers wholly.
-nlohmann::json compare(const render::Render& render, const Image& reference, float exposure_ev) {
+/// How a render differs from a reference over the pixels that the asset covers wholly; how noisy it is, a
+/// render with another seed tells.
+nlohmann::json compare(const render::Render& render, const render::Render& again, const Image& reference,
+                       float exposure_ev) {
   glm::dvec3 sum(0.0), reference_sum(0.0), absolute(0.0);
   double display_absolute = 0, display_squared = 0, noise = 0;
   int64_t pixels = 0;
@@ -52,7 +54,8 @@ nlohmann::json compare(const render::Render& render, const Image& reference, flo
       if (render.coverage.at(x, y)[0] < 1.0f) continue;
       const glm::dvec3 a(render.radiance.rgb(x, y)), b(reference.rgb(x, y));
       sum += a, reference_sum += b, absolute += glm::abs(a - b);
-      noise += glm::dot(glm::dvec3(render.variance.rgb(x, y)), glm::dvec3(1.0 / 3.0));
+      const glm::dvec3 change = a - glm::dvec3(again.radiance.rgb(x, y));
+      noise += glm::dot(change, change) / 6.0;
       const glm::dvec3 d(display.rgb(x, y) - reference_display.rgb(x, y));
       display_absolute += (std::abs(d.x) + std::abs(d.y) + std::abs(d.z)) / 3.0;
       display_squared += glm::dot(d, d) / 3.0;
@@ -67,7 +70,7 @@ nlohmann::json compare(const render::Render& render, const Image& reference, flo
           {"mean_ratio", total(sum) / total(reference_sum)},
           {"mean_ratio_rgb", {ratio.x, ratio.y, ratio.z}},
           {"relative_mean_absolute_difference", total(absolute) / total(reference_sum)},
-          {"relative_noise_of_patina", std::sqrt(noise / n) / (total(reference_sum) / (3 * n))},
+          {"relative_noise_of_patina", std::sqrt(noise / n) / (total(sum) / (3 * n))},
           {"display_mean_absolute_difference", display_absolute / n},
           {"display_psnr_db", -10.0 * std::log10(display_squared / n)}};
 }
@@ -152,7 +155,8 @@ int main(int argc, char** argv) {
       const Image reference = read_hdr(reference_path);
       if (reference.width != size || reference.height != size)
         throw Error(ErrorCode::kUsage, reference_path.string(), "the reference must have the render's size");
-      nlohmann::json report = compare(result, reference, exposure_ev);
+      options.seed = 1;
+      nlohmann::json report = compare(result, render::render(scene, camera, options), reference, exposure_ev);
       report["seconds"] = seconds;
       report["samples"] = samples;
       std::printf("%s\n", report.dump(2).c_str());

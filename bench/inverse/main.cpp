@@ -9,8 +9,6 @@
 //
 //   bench_inverse [--shared ../shared] [--resolution 512] [--samples 128] [--iterations 200] [--only NAME]
 //                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]
-#include <sys/resource.h>
-
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -24,6 +22,7 @@
 #include "export_scene.h"
 #include "path_replay_fit.h"
 #include "patina/base/files.h"
+#include "patina/base/memory.h"
 #include "patina/image/image_io.h"
 #include "patina/render/path_tracer.h"
 
@@ -48,12 +47,6 @@ struct Options {
   std::string only;
   test::RecoveryOptions recovery;
 };
-
-double peak_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;
-}
 
 void draw(const test::Recovery& r, const fs::path& folder, const std::string& name) {
   fs::create_directories(folder);
@@ -106,8 +99,9 @@ json conflicting(const test::RecoveryOptions& options, const fs::path& asset, co
   return all;
 }
 
-// Seconds and noise of the views' renders: the root of the pixels' mean variance over their mean radiance,
-// where the asset covers a pixel wholly. Mitsuba's share is measured by mitsuba_peer.py.
+// Seconds and noise of the views' renders: the root of the pixels' mean variance, from two renders with
+// different seeds, over their mean radiance, where the asset covers a pixel wholly. Mitsuba's share is
+// measured by mitsuba_peer.py.
 json render_noise(const test::Recovery& r, int max_depth) {
   render::PathOptions path;
   path.samples_per_pixel = kRenderSamples;
@@ -116,13 +110,17 @@ json render_noise(const test::Recovery& r, int max_depth) {
   double seconds = 0, variance = 0, radiance = 0, count = 0;
   for (const views::View& view : r.views.views) {
     const auto begin = std::chrono::steady_clock::now();
+    path.seed = 0;
     const render::Render rendered = render::render(scene, view.camera, path);
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    path.seed = 1;
+    const render::Render again = render::render(scene, view.camera, path);
     for (size_t i = 0; i < rendered.coverage.pixels.size(); ++i) {
       if (rendered.coverage.pixels[i] < 1.0f) continue;
       for (size_t c = 0; c < 3; ++c) {
-        variance += rendered.variance.pixels[3 * i + c];
-        radiance += rendered.radiance.pixels[3 * i + c];
+        const double value = rendered.radiance.pixels[3 * i + c];
+        variance += std::pow(value - again.radiance.pixels[3 * i + c], 2) / 2;
+        radiance += value;
         count += 1;
       }
     }
@@ -204,7 +202,7 @@ void run(const Options& options) {
     draw(r, options.pictures, name);
     if (file == kAssets[0]) {
       report["seconds_9x512"] = r.fit_seconds;
-      report["peak_mb"] = peak_mb();
+      report["peak_mb"] = static_cast<double>(peak_resident_bytes()) / 1048576;
       report["render"] = render_noise(r, options.recovery.fit.max_depth);
       bench::export_scene(r, kMinViews, options.pictures / "scene");
       const double replay = bench::path_replay_iteration_seconds(r, options.recovery.fit, kReplayPaths);

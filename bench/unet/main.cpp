@@ -2,8 +2,6 @@
 // peak, and where the time goes. Prints and writes JSON.
 //
 //   bench_unet [--out build/bench/unet.json] [--size 512] [--grid 1] [--threads N] [--f32] [--repeat 5]
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -20,6 +18,7 @@
 #include "make_checkpoint/configs.h"
 #include "operation_times.h"
 #include "patina/base/files.h"
+#include "patina/base/memory.h"
 #include "patina/base/parallel.h"
 #include "patina/diffusion/unet.h"
 #include "patina/diffusion/vae.h"
@@ -121,9 +120,7 @@ nlohmann::json measure(const Options& options) {
       best_seconds(std::max(1, options.repeat / 2), decode);
   for (const auto& [name, share] : bench::operation_seconds(decode)) result["vae_operations"][name] = share;
 
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  result["peak_mb"] = static_cast<double>(usage.ru_maxrss) / 1024;
+  result["peak_mb"] = static_cast<double>(peak_resident_bytes()) / 1048576;
   return result;
 }
 

@@ -143,5 +143,58 @@ TEST(RandomStream, gaussian_numbers_have_unit_variance) {
   EXPECT_NEAR(squares / kSamples, 1, 4 * std::sqrt(2.0 / kSamples));
 }
 
+// How many of the intervals (columns × rows of the unit square) hold exactly one of as many samples.
+int boxes_with_one(const std::vector<vec2>& points, int columns, int rows) {
+  std::vector<int> held(static_cast<size_t>(columns * rows));
+  for (const vec2& p : points) {
+    const int x = static_cast<int>(p.x * static_cast<float>(columns)),
+              y = static_cast<int>(p.y * static_cast<float>(rows));
+    ++held[static_cast<size_t>(y * columns + x)];
+  }
+  return static_cast<int>(std::count(held.begin(), held.end(), 1));
+}
+
+TEST(even_stream, every_draw_has_one_sample_in_every_box) {
+  constexpr int kSamples = 64, kDraws = 12;
+  for (uint64_t pixel = 0; pixel < 50; ++pixel) {
+    std::vector<std::vector<vec2>> draws(kDraws);
+    for (uint32_t s = 0; s < kSamples; ++s) {
+      RandomStream random = RandomStream::even(3, RandomPurpose::kTest, pixel, s);
+      for (int d = 0; d < kDraws; ++d)
+        draws[static_cast<size_t>(d)].push_back(d % 3 ? random.uniform2() : vec2(random.uniform(), 0.0f));
+    }
+    for (int d = 0; d < kDraws; ++d) {
+      for (int columns = d % 3 ? 1 : kSamples; columns <= kSamples; columns *= 2)
+        EXPECT_EQ(boxes_with_one(draws[static_cast<size_t>(d)], columns, kSamples / columns), kSamples)
+            << "draw " << d << ", " << columns << " columns";
+    }
+  }
+}
+
+TEST(even_stream, draws_and_indices_know_nothing_of_each_other) {
+  // Sums over many indices of products of centred draws: of two draws of a sample, of one draw of two
+  // samples' indices.
+  constexpr int kIndices = 40000;
+  constexpr uint32_t kSample = 5;
+  double between_draws = 0, between_coordinates = 0, between_indices = 0, mean = 0;
+  float last = 0.5f;
+  for (uint64_t i = 0; i < kIndices; ++i) {
+    RandomStream random = RandomStream::even(8, RandomPurpose::kTest, i, kSample);
+    const float a = random.uniform() - 0.5f;
+    const vec2 b = random.uniform2() - 0.5f;
+    mean += a;
+    between_draws += a * b.x;
+    between_coordinates += b.x * b.y;
+    between_indices += a * last;
+    last = a;
+  }
+  const double bound =
+      4.5 / 12 * std::sqrt(kIndices);  // standard deviations of a sum of products of variance 1/144
+  EXPECT_LT(std::abs(mean), 4.5 * std::sqrt(kIndices / 12.0));
+  EXPECT_LT(std::abs(between_draws), bound);
+  EXPECT_LT(std::abs(between_coordinates), bound);
+  EXPECT_LT(std::abs(between_indices), bound);
+}
+
 }  // namespace
 }  // namespace patina

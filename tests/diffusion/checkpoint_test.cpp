@@ -25,8 +25,8 @@ make::Model small_model(Family family, ElementType type = ElementType::kF32) {
   return model;
 }
 
-std::vector<Image> run(const ModelPaths& paths, Dtype dtype = Dtype::kF32) {
-  const Model model(paths, {dtype, 0});
+std::vector<Image> run(const ModelPaths& paths, Dtype dtype = Dtype::kF32, bool low_memory = false) {
+  const Model model(paths, {dtype, 0, low_memory});
   DetailOptions options = test::short_options();
   options.num_steps = 2, options.strength = 1;
   options.negative_prompt = "clean";
@@ -113,6 +113,16 @@ TEST_P(Checkpoint, half_mixed_and_sharded_weights_give_the_same_picture_to_the_b
   expect_same(run(single, Dtype::kBf16), run(with_tokenizer({file("sharded"), {}, {}, {}}), Dtype::kBf16));
 }
 
+TEST_P(Checkpoint, networks_that_are_read_for_each_use_give_the_same_picture_to_the_bit) {
+  // As stored, so that the tensors lie in the file, and converted; with LoRAs of both networks.
+  const make::Model model = small_model(GetParam(), ElementType::kBF16);
+  ModelPaths paths = write_single("single.safetensors", model);
+  make::write_lora(file("lora.safetensors"), model);
+  paths.loras = {{file("lora.safetensors"), 0.7f}};
+  for (const Dtype dtype : {Dtype::kBf16, Dtype::kF32})
+    expect_same(run(paths, dtype, /*low_memory=*/true), run(paths, dtype));
+}
+
 INSTANTIATE_TEST_SUITE_P(Families, Checkpoint, testing::Values(Family::kSd1, Family::kSd2),
                          [](const auto& test_info) {
                            return test_info.param == Family::kSd1 ? "sd1" : "sd2";
@@ -157,6 +167,21 @@ TEST_F(BrokenCheckpoint, a_missing_tensor_is_named_as_the_file_would_name_it) {
   });
   expect_in("model.safetensors: 1 tensors are missing: model.diffusion_model.middle_block.1.proj_out.weight",
             check());
+}
+
+TEST_F(BrokenCheckpoint, is_told_before_the_first_use) {
+  edit([](std::vector<nn::TensorPlan>& plans) {
+    std::erase_if(plans, [](const nn::TensorPlan& plan) {
+      return plan.name == "first_stage_model.decoder.conv_in.weight";
+    });
+  });
+  const fs::path control = folder_.path() / "control.safetensors";
+  make::write_controlnet(control, small_model(Family::kSd1), make::Layout::kLdm, false);
+  ModelPaths paths{path_, {}, control, control};
+  paths.tokenizer = kTokenizer;
+  expect_in("first_stage_model.decoder.conv_in.weight", failure([&] {
+              const Model model(paths, {Dtype::kF32, 0, /*low_memory=*/true});
+            }));
 }
 
 TEST_F(BrokenCheckpoint, a_wrong_shape_is_named_with_what_was_expected) {

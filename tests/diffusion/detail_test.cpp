@@ -160,11 +160,17 @@ TEST(Detail, bf16_stays_near_f32) {
   const Model model({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kBf16, 0});
   const DetailInputs inputs = made_inputs(1, 128);
   DetailOptions options = short_options();
-  options.guidance_scale = 1;
-  const Image f32 = run(inputs, options)[0], bf16 = generate_detail(model, inputs, options, {}, {})[0];
-  double squares = 0;
-  for (size_t i = 0; i < f32.pixels.size(); ++i) squares += std::pow(f32.pixels[i] - bf16.pixels[i], 2);
-  EXPECT_LT(std::sqrt(squares / static_cast<double>(f32.pixels.size())), 0.02);
+  options.num_steps = 20, options.strength = 1;
+  for (const float guidance_scale : {1.0f, 7.5f}) {
+    options.guidance_scale = guidance_scale;
+    const Image f32 = run(inputs, options)[0], bf16 = generate_detail(model, inputs, options, {}, {})[0];
+    double squares = 0;
+    for (size_t i = 0; i < f32.pixels.size(); ++i) squares += std::pow(f32.pixels[i] - bf16.pixels[i], 2);
+    const double psnr = -10 * std::log10(squares / static_cast<double>(f32.pixels.size()));
+    RecordProperty("psnr_at_guidance_" + std::to_string(static_cast<int>(guidance_scale)),
+                   std::to_string(psnr));
+    EXPECT_GT(psnr, 35) << "guidance " << guidance_scale;
+  }
 }
 
 TEST(Detail, refuses_inputs_that_do_not_fit_and_says_what_would) {

@@ -401,7 +401,7 @@ TEST(path_tracer, reports_every_row_and_stops_when_asked) {
   EXPECT_THROW(render(room.scene, room.camera, options, progress, "views"), Error);
 }
 
-TEST(path_tracer, variance_is_that_of_the_mean) {
+TEST(path_tracer, even_samples_vary_less_than_independent_ones) {
   const Room room(BsdfModel::kGltf);
   PathOptions options;
   options.samples_per_pixel = 32;
@@ -419,7 +419,7 @@ TEST(path_tracer, variance_is_that_of_the_mean) {
     }
   }
   for (size_t i = 0; i < n; ++i) observed += (squares[i] - sum[i] * sum[i] / kRepeats) / (kRepeats - 1);
-  EXPECT_NEAR(stated / observed, 1.0, 0.15);
+  EXPECT_GT(stated / observed, 1.5);
 }
 
 }  // namespace

@@ -39,21 +39,26 @@ std::array<float, 4> gaussian4(uint64_t seed, RandomPurpose purpose, uint64_t in
 class RandomStream {
  public:
   RandomStream(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sub_index = 0);
+  /// The stream of sample 0, 1, 2, … of `index`. Together they are spread evenly: the k-th draw of 2ⁿ samples has one in each
+  /// of 2ⁿ equal intervals, of a uniform2() also in each of 2ⁿ equal boxes of any shape. Sobol's first two dimensions, order
+  /// and digits scrambled anew for every draw [Burley2020].
+  static RandomStream even(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sample);
 
   float uniform();  ///< in [0,1)
-  vec2 uniform2() {
-    const float x = uniform();
-    return {x, uniform()};
-  }
+  vec2 uniform2();
   float gaussian();  ///< standard normal
 
  private:
   std::array<uint32_t, 4> next_block();
+  std::array<uint32_t, 2> next_even();
 
   std::array<uint32_t, 2> key_;
   std::array<uint32_t, 4> counter_;
   std::array<uint32_t, 4> block_{};
   int used_ = 4;
+  bool is_even_ = false;
+  uint32_t reversed_sample_ = 0;  // of an even stream; its digits from the last to the first
+  uint32_t draw_ = 0;
 };
 
 }  // namespace patina

@@ -1,6 +1,7 @@
 #include "patina/diffusion/blocks.h"
 
 #include <cmath>
+#include <vector>
 
 #include <ATen/ATen.h>
 
@@ -9,6 +10,7 @@ namespace {
 
 constexpr double kTransformerNormEpsilon = 1e-6;  // diffusers' Transformer2DModel, whatever norm_eps says
 constexpr int64_t kFeedForwardFactor = 4;
+constexpr int64_t kFeedForwardTokens = 8192;  // that pass through it at once
 
 Attention load_attention(nn::WeightReader& weights, const std::string& name, int64_t channels,
                          int64_t context_width, int64_t num_heads) {
@@ -64,8 +66,13 @@ at::Tensor Attention::operator()(const at::Tensor& x, const at::Tensor& context,
 }
 
 at::Tensor FeedForward::operator()(const at::Tensor& x, const nn::Recorder& record) const {
-  const at::Tensor gated = record(name + ".net.0", nn::geglu(net_0_proj(x, record)));
-  return record(name, net_2(gated, record));
+  // The values between the layers are eight times as many as those around them, and each token is for itself.
+  std::vector<at::Tensor> parts;
+  for (const at::Tensor& tokens : x.split(kFeedForwardTokens, 1)) {
+    const at::Tensor gated = record(name + ".net.0", nn::geglu(net_0_proj(tokens, record)));
+    parts.push_back(net_2(gated, record));
+  }
+  return record(name, parts.size() == 1 ? parts.front() : at::cat(parts, 1));
 }
 
 at::Tensor TransformerBlock::operator()(const at::Tensor& x, int64_t height, int64_t width,

@@ -44,6 +44,10 @@ at::Tensor product(const LoraDelta& delta, at::IntArrayRef shape) {
 
 }  // namespace
 
+void release_pages(const TensorTable& table) {
+  for (const auto& [name, tensor] : table.tensors) release_pages(tensor.entry.bytes);
+}
+
 bool same_but_ones(at::IntArrayRef a, at::IntArrayRef b) {
   const at::IntArrayRef longer = a.size() > b.size() ? a : b, shorter = a.size() > b.size() ? b : a;
   for (size_t i = 0; i < longer.size(); ++i) {

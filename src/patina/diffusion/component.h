@@ -4,6 +4,8 @@
 
 #include <filesystem>
 
+#include "patina/diffusion/dry_run.h"
+#include "patina/diffusion/held.h"
 #include "patina/diffusion/lora.h"
 #include "patina/diffusion/network_part.h"
 #include "patina/nn/weights.h"
@@ -39,6 +41,24 @@ Network load_network(const NetworkPart<Config>& part, at::ScalarType type,
   Network network(part.config, weights);
   weights.finish();
   return network;
+}
+
+/// Gives back the memory of the file pages that tensors of the table were read from.
+void release_pages(const TensorTable& table);
+
+/// Loads the network for good, or only checks it and reads it whenever it is used. Throws as load_network.
+template <class Network, class Config>
+Held<Network> hold_network(const NetworkPart<Config>& part, at::ScalarType type, bool resident,
+                           const LoraDeltas& deltas = {}) {
+  if (resident) return Held<Network>(load_network<Network>(part, type, &deltas));
+  const auto read = [part, type, deltas] {
+    const auto release = [table = part.table](const Network* network) {
+      delete network;
+      release_pages(table);
+    };
+    return std::shared_ptr<const Network>(new Network(load_network<Network>(part, type, &deltas)), release);
+  };
+  return Held<Network>(part.config, check_tensors<Network>(part), read);
 }
 
 }  // namespace patina::diffusion

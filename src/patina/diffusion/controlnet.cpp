@@ -66,11 +66,13 @@ ControlResiduals ControlNet::operator()(const at::Tensor& sample, const at::Tens
   PATINA_CHECK_EQ(sample.size(1), config_.unet.in_channels);
   const at::Tensor x = sample.to(type_).contiguous(at::MemoryFormat::ChannelsLast);
   const Conditions conditions{encoder_.time(timesteps, record), text.to(type_), bias, record};
-  const auto [skips, mid] = encoder_(encoder_.conv_in(x, record) + hint, conditions);
+  auto [skips, mid] = encoder_(encoder_.conv_in(x, record) + hint, conditions);
 
   ControlResiduals residuals;
-  for (size_t i = 0; i < skips.size(); ++i)
+  for (size_t i = 0; i < skips.size(); ++i) {
     residuals.down.push_back(controlnet_down_blocks_[i](skips[i], record) * scale);
+    skips[i].reset();
+  }
   residuals.mid = controlnet_mid_block_(mid, record) * scale;
   return residuals;
 }

@@ -71,7 +71,7 @@ std::vector<Image> generate_detail(const Model& model, const DetailInputs& input
                   "(try f32)");
     }
   }
-  return decode_views(model.state().vae, latents, run->sizes, progress);
+  return decode_views(*model.state().vae.use(), latents, run->sizes, progress);
 }
 
 }  // namespace patina::diffusion

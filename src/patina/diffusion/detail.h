@@ -47,7 +47,8 @@ struct ModelPaths {
 
 struct ModelOptions {
   Dtype dtype = Dtype::kAuto;
-  int num_threads = 0;  // 0: all processors
+  int num_threads = 0;      // 0: all processors
+  bool low_memory = false;  // all networks but the U-Net are read anew for each use
 };
 
 /// Looks at the folders and weight files of a model without loading it. Throws Error that names what is
@@ -117,6 +118,14 @@ struct DetailHooks {
   std::function<void(const Checkpoint&)> on_checkpoint;  // after every step; may be empty
   std::optional<Checkpoint> resume;                      // from an earlier call with equal inputs and options
 };
+
+/// Bytes that generate_detail needs for views of this size.
+struct DetailMemory {
+  int64_t weights = 0;      // of the networks that are in memory at once
+  int64_t activations = 0;  // what they compute on, at the most
+};
+DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
+                            const DetailOptions& options);
 
 /// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4]. Encodes and decodes
 /// view by view. Returns grid² sRGB images [H,W,3] in [0,1]. Throws Error{kUsage} if sizes do not fit.

@@ -94,11 +94,6 @@ GridSizes checked_sizes(const Model& model, const DetailInputs& inputs, const De
   return sizes;
 }
 
-float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
-  if (options.guidance_scale != kAutoGuidanceScale) return options.guidance_scale;
-  return scheduler.zero_terminal_snr ? 3.5f : 7.5f;
-}
-
 /// [1,3,H,W] f32 from an image, values as they are.
 at::Tensor tensor_from_image(const Image& image) {
   const at::Tensor pixels = at::from_blob(const_cast<float*>(image.pixels.data()),
@@ -138,6 +133,11 @@ std::vector<float> start_latents(const Vae& vae, const std::vector<Image>& views
 
 }  // namespace
 
+float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
+  if (options.guidance_scale != kAutoGuidanceScale) return options.guidance_scale;
+  return scheduler.zero_terminal_snr ? 3.5f : 7.5f;
+}
+
 std::vector<float> scheduler_noise(uint64_t seed, int call, size_t size) {
   std::vector<float> noise(size);
   for (size_t i = 0; i < size; i += 4) {
@@ -166,14 +166,14 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
   std::vector<std::string> prompts{options.prompt};
   const float guidance_scale = guidance_scale_of(options, run->plan.config);
   if (guidance_scale != 1) prompts.insert(prompts.begin(), options.negative_prompt);
-  const at::Tensor text =
-      encode_prompts(networks.tokenizer, networks.text_encoder, networks.words, prompts, options.clip_skip);
+  const at::Tensor text = encode_prompts(networks.tokenizer, *networks.text_encoder.use(), networks.words,
+                                         prompts, options.clip_skip);
   run->denoiser = {
       &networks.unet,
-      {{&networks.controlnet_tile, grid_hint(networks.controlnet_tile, inputs.tile_views, sizes.grid),
+      {{&networks.controlnet_tile, grid_hint(*networks.controlnet_tile.use(), inputs.tile_views, sizes.grid),
         options.tile_scale},
-       {&networks.controlnet_normal, grid_hint(networks.controlnet_normal, inputs.normal_views, sizes.grid),
-        options.normal_scale}},
+       {&networks.controlnet_normal,
+        grid_hint(*networks.controlnet_normal.use(), inputs.normal_views, sizes.grid), options.normal_scale}},
       text,
       guidance_scale,
       &run->bias,
@@ -192,8 +192,9 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
     const std::vector<Image>& start_views =
         inputs.start_views.empty() ? inputs.tile_views : inputs.start_views;
     state.next_call = run->start;
-    state.latents = add_noise(run->plan, run->start,
-                              start_latents(networks.vae, start_views, sizes.grid, progress), inputs.noise);
+    state.latents =
+        add_noise(run->plan, run->start,
+                  start_latents(*networks.vae.use(), start_views, sizes.grid, progress), inputs.noise);
   }
   return run;
 }

@@ -40,6 +40,9 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
                                         const DetailOptions& options, const std::optional<Checkpoint>& resume,
                                         const Progress& progress);
 
+/// The scale that DetailOptions asks for, or the one that suits the scheduler.
+float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler);
+
 /// Noise of ancestral schedulers: a value depends on (seed, call, place) alone, so that a resumed run draws
 /// the same.
 std::vector<float> scheduler_noise(uint64_t seed, int call, size_t size);

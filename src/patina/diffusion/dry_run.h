@@ -25,13 +25,14 @@ class ShapeWeights final : public nn::WeightSource {
   const TensorTable& table_;
 };
 
-/// Throws Error that names every tensor that does not fit.
+/// The number of parameters. Throws Error that names every tensor that does not fit.
 template <class Network, class Config>
-void check_tensors(const NetworkPart<Config>& part) {
+int64_t check_tensors(const NetworkPart<Config>& part) {
   ShapeWeights source(part.table);
   nn::WeightReader weights(source, c10::ScalarType::Float);
   Network network(part.config, weights);
   weights.finish();
+  return weights.num_parameters();
 }
 
 /// Answers every question with the shape that is asked for, and notes it.

@@ -86,10 +86,11 @@ const Vae& Parts::vae() {
   if (!vae_) vae_.emplace(folder_ / "vae", at::kFloat);
   return *vae_;
 }
-const ControlNet& Parts::controlnet(const std::string& name) {
+const Held<ControlNet>& Parts::controlnet(const std::string& name) {
   const auto found = controlnets_.find(name);
   if (found != controlnets_.end()) return found->second;
-  return controlnets_.emplace(name, ControlNet(folder_ / ("controlnet_" + name), at::kFloat)).first->second;
+  ControlNet network(folder_ / ("controlnet_" + name), at::kFloat);
+  return controlnets_.emplace(name, Held<ControlNet>(std::move(network))).first->second;
 }
 
 namespace {
@@ -259,7 +260,7 @@ void compare_residuals(const ControlResiduals& residuals, const std::string& pre
 void check_controlnet(const Stored& stored, const std::string& which, Parts& parts, Comparison& comparison) {
   Activations activations;
   const nn::Recorder record = activations.recorder();
-  const ControlNet& network = parts.controlnet(which);
+  const ControlNet& network = *parts.controlnet(which).use();
   const float scale = stored.has("conditioning_scale") ? stored["conditioning_scale"].item<float>() : 1.0f;
   const UNetInputs inputs = unet_inputs(stored);
   const at::Tensor hint = network.hint(stored["controlnet_cond"], record);
@@ -277,7 +278,7 @@ void check_unet_controlnets(const Stored& stored, Parts& parts, Comparison& comp
   ControlResiduals residuals;
   int64_t index = 0;
   for (const std::string name : {"tile", "normal"}) {
-    const ControlNet& network = parts.controlnet(name);
+    const ControlNet& network = *parts.controlnet(name).use();
     residuals = sum(std::move(residuals),
                     network(inputs.sample, inputs.timesteps, inputs.text,
                             network.hint(stored["cond_" + name]), scales[index++].item<float>()));

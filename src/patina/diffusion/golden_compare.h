@@ -62,7 +62,7 @@ class Parts {
   const TextEncoder& text_encoder();
   const UNet& unet();
   const Vae& vae();
-  const ControlNet& controlnet(const std::string& name);  // <folder>/controlnet_<name>
+  const Held<ControlNet>& controlnet(const std::string& name);  // <folder>/controlnet_<name>
 
  private:
   std::filesystem::path folder_;
@@ -70,7 +70,7 @@ class Parts {
   std::optional<TextEncoder> text_encoder_;
   std::optional<UNet> unet_;
   std::optional<Vae> vae_;
-  std::map<std::string, ControlNet> controlnets_;
+  std::map<std::string, Held<ControlNet>> controlnets_;
 };
 
 /// Trajectories of one scheduler variant; `folder` holds index.json and inputs.safetensors beside the file.

@@ -195,8 +195,8 @@ void check_image_to_image(const Stored& stored, Parts& parts, Comparison& compar
   for (const std::string name : {"tile", "normal"}) {
     std::string scale;
     std::getline(scales, scale, ',');
-    const ControlNet& network = parts.controlnet(name);
-    controls.push_back({&network, network.hint(stored["cond_" + name + "_01"]), std::stof(scale)});
+    const Held<ControlNet>& network = parts.controlnet(name);
+    controls.push_back({&network, network.use()->hint(stored["cond_" + name + "_01"]), std::stof(scale)});
   }
   check_run(stored, parts, plan, start, controls, noisy, comparison);
 }

@@ -6,6 +6,7 @@
 
 #include "patina/diffusion/controlnet.h"
 #include "patina/diffusion/detail.h"
+#include "patina/diffusion/held.h"
 #include "patina/diffusion/schedulers.h"
 #include "patina/diffusion/text_conditioning.h"
 #include "patina/diffusion/tokenizer.h"
@@ -17,10 +18,10 @@ namespace patina::diffusion {
 struct Model::State {
   Dtype dtype = Dtype::kF32;
   Tokenizer tokenizer;
-  TextEncoder text_encoder;
+  Held<TextEncoder> text_encoder;
   UNet unet;
-  Vae vae;  // always f32: decoding is a hundredth of the work, and the pixels show its rounding
-  ControlNet controlnet_tile, controlnet_normal;
+  Held<Vae> vae;  // always f32: decoding is a hundredth of the work, and the pixels show its rounding
+  Held<ControlNet> controlnet_tile, controlnet_normal;
   SchedulerConfig scheduler;
   LearnedWords words;
   std::vector<std::string> notes;  // what was chosen without being told to, for the description

@@ -28,8 +28,8 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
   ControlResiduals residuals;
   for (const Control& control : controls) {
     if (control.scale == 0) continue;
-    residuals =
-        sum(std::move(residuals), (*control.network)(sample, timesteps, text, control.hint, control.scale, {},
+    const std::shared_ptr<const ControlNet> network = control.network->use();
+    residuals = sum(std::move(residuals), (*network)(sample, timesteps, text, control.hint, control.scale, {},
                                                      bias_controls ? bias : nullptr));
   }
   const at::Tensor out =

@@ -8,6 +8,7 @@
 
 #include "patina/base/progress.h"
 #include "patina/diffusion/controlnet.h"
+#include "patina/diffusion/held.h"
 #include "patina/diffusion/schedulers.h"
 #include "patina/diffusion/unet.h"
 
@@ -15,7 +16,7 @@ namespace patina::diffusion {
 
 /// A ControlNet with its condition image already embedded.
 struct Control {
-  const ControlNet* network = nullptr;
+  const Held<ControlNet>* network = nullptr;
   at::Tensor hint;  // [1,C,H,W]
   float scale = 1;
 };

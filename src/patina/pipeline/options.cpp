@@ -215,6 +215,13 @@ std::vector<Option> make_options() {
        .stages = kDetailStage},
       {{"auto", Dtype::kAuto}, {"f32", Dtype::kF32}, {"bf16", Dtype::kBf16}},
       [](Config & c) -> auto& { return c.dtype; }));
+  add(flag_option(
+      {.name = "low-memory",
+       .aliases = {},
+       .group = model,
+       .placeholder = "",
+       .help = "Keep only the U-Net in memory and read text encoder, ControlNets and VAE anew for each use."},
+      [](Config & c) -> auto& { return c.low_memory; }));
 
   add(views_option());
   add(resolution_option());

@@ -6,6 +6,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/memory.h"
 #include "patina/correspond/correspondences.h"
 #include "patina/correspond/noise.h"
 #include "patina/image/image_io.h"
@@ -56,6 +57,22 @@ json noise_metrics(const correspond::NoiseField& noise, int grid) {
   return worst;
 }
 
+double megabytes(int64_t bytes) {
+  return static_cast<double>(bytes) / 1048576;
+}
+
+// Once a machine swaps, steps take minutes: better said before the first one. The weights are there by now.
+void warn_of_memory(const diffusion::DetailMemory& memory, const Config& config, const Progress& progress) {
+  const int64_t available = available_bytes();
+  if (available == 0 || memory.activations <= available) return;
+  progress.warn(
+      fmt::format("the networks will need about {:.1f} GB beside their weights, and {:.1f} GB are free: the "
+                  "machine may swap or "
+                  "end the run; take {}fewer or smaller views (--views, --resolution)",
+                  static_cast<double>(memory.activations) * 1e-9, static_cast<double>(available) * 1e-9,
+                  config.low_memory ? "" : "--low-memory, "));
+}
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -101,14 +118,20 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
   const std::string key = detail_key(bench, views, config);
   run.run_stage("detail", key, progress, [&] {
     const auto start = std::chrono::steady_clock::now();
+    const int64_t bytes_before = resident_bytes();
     std::optional<diffusion::Model> own_model;
     std::optional<diffusion::Model>& model = shared_model ? *shared_model : own_model;
-    if (!model) model.emplace(config.model, diffusion::ModelOptions{config.dtype, config.num_threads});
+    if (!model)
+      model.emplace(config.model,
+                    diffusion::ModelOptions{config.dtype, config.num_threads, config.low_memory});
     const double load_seconds = seconds_since(start);
     const PreparedDetail prepared = prepare_detail(bench, views, config, *model, progress);
 
     diffusion::DetailOptions options = config.detail;
     options.seed = config.seed;
+    const diffusion::DetailMemory memory = diffusion::predict_memory(
+        *model, views.set.grid, bench.cameras[0].width, bench.cameras[0].height, options);
+    warn_of_memory(memory, config, progress);
     diffusion::DetailHooks hooks;
     hooks.on_checkpoint = [&](const diffusion::Checkpoint& c) {
       run.save_checkpoint("detail", key, c.next_step, c.bytes);
@@ -127,6 +150,9 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     result.metrics = {{"noise", prepared.noise_metrics},
                       {"model", model->description()},
                       {"latent_pixels", latent_pixels},
+                      {"memory_mb",
+                       {{"predicted", megabytes(bytes_before + memory.weights + memory.activations)},
+                        {"peak", megabytes(peak_resident_bytes())}}},
                       {"seconds",
                        {{"load", load_seconds},
                         {"noise", prepared.noise_seconds},

@@ -4,14 +4,17 @@
 
 namespace patina::render {
 
-Ray Camera::ray(const vec2& pixel) const {
-  const float focal = focal_pixels();
-  const vec3 direction_camera((pixel.x - 0.5f * static_cast<float>(width)) / focal,
-                              (0.5f * static_cast<float>(height) - pixel.y) / focal, -1.0f);
+Ray CameraRays::operator()(const vec2& pixel) const {
+  const vec3 direction_camera((pixel.x - 0.5f * static_cast<float>(camera_.width)) / focal_,
+                              (0.5f * static_cast<float>(camera_.height) - pixel.y) / focal_, -1.0f);
   Ray out;
-  out.origin = position();
-  out.direction = glm::normalize(mat3(world_from_camera) * direction_camera);
+  out.origin = camera_.position();
+  out.direction = glm::normalize(mat3(camera_.world_from_camera) * direction_camera);
   return out;
+}
+
+Ray Camera::ray(const vec2& pixel) const {
+  return CameraRays(*this)(pixel);
 }
 
 std::optional<Camera::Projection> Camera::project(const vec3& p_world) const {

@@ -33,6 +33,17 @@ struct Camera {
   std::optional<Projection> project(const vec3& p_world) const;
 };
 
+/// The rays of one camera, which must outlive it; the tangent of the field of view is taken once for all of them.
+class CameraRays {
+ public:
+  explicit CameraRays(const Camera& camera) : camera_(camera), focal_(camera.focal_pixels()) {}
+  Ray operator()(const vec2& pixel) const;
+
+ private:
+  const Camera& camera_;
+  float focal_;
+};
+
 /// A camera at `eye` that looks at `target`, its image's vertical as near to +Y as can be.
 Camera look_at(const vec3& eye, const vec3& target, float fov_y, int width, int height);
 

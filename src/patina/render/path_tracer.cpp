@@ -31,7 +31,7 @@ vec3 direct_light(const Scene& scene, const SurfacePoint& point, const Frame& fr
   const BsdfModel model = scene.bsdf_model();
   vec3 sum(0.0f);
 
-  const auto arriving = [&](const LightSample& light, bool met_by_bsdf) {
+  const auto arriving = [&](const LightSample& light, bool met_by_bsdf, float u_shadow) {
     if (!(glm::dot(light.direction, point.n_geometric) > 0.0f)) return vec3(0.0f);
     const vec3 wi = frame.to_local(light.direction);
     const BsdfEvaluation bsdf = evaluate_bsdf(model, point.bsdf, wo, wi);
@@ -39,19 +39,25 @@ vec3 direct_light(const Scene& scene, const SurfacePoint& point, const Frame& fr
     if (!(max_component(reflected) > 0.0f)) return vec3(0.0f);
     const Ray shadow =
         light.at_infinity ? spawn_ray(point, light.direction) : spawn_segment(point, light.p_light);
-    if (scene.occluded(shadow, random.uniform())) return vec3(0.0f);
+    if (scene.occluded(shadow, u_shadow)) return vec3(0.0f);
     const float weight = met_by_bsdf ? balance_heuristic(light.pdf, bsdf.pdf) : 1.0f;
     return reflected * (weight / light.pdf);
   };
 
+  // Every number is drawn whether it is needed or not: so the n-th draw of all samples of a pixel is for the
+  // same purpose, over which they are spread evenly.
   if (lights.has_extended()) {
     const float u_light = random.uniform();
-    if (const auto light = lights.sample_extended(point.p_world, u_light, random.uniform2()))
-      sum += arriving(*light, true);
+    const vec2 u_place = random.uniform2();
+    const float u_shadow = random.uniform();
+    if (const auto light = lights.sample_extended(point.p_world, u_light, u_place))
+      sum += arriving(*light, true, u_shadow);
   }
-  if (lights.has_punctual())
-    if (const auto light = lights.sample_punctual(point.p_world, random.uniform()))
-      sum += arriving(*light, false);
+  if (lights.has_punctual()) {
+    const float u_light = random.uniform(), u_shadow = random.uniform();
+    if (const auto light = lights.sample_punctual(point.p_world, u_light))
+      sum += arriving(*light, false, u_shadow);
+  }
   return sum;
 }
 
@@ -128,6 +134,7 @@ Render render(const Scene& scene, const Camera& camera, const PathOptions& optio
   const int width = camera.width, height = camera.height, samples = options.samples_per_pixel;
   Render out{Image(width, height, 3), Image(width, height, 1), Image(width, height, 3)};
 
+  const CameraRays rays(camera);
   std::mutex progress_mutex;
   int64_t rows_done = 0;
   parallel_for(0, height, 1, [&](int64_t begin, int64_t end) {
@@ -138,10 +145,11 @@ Render render(const Scene& scene, const Camera& camera, const PathOptions& optio
         double covered = 0;
         const auto pixel = static_cast<uint64_t>(y) * static_cast<uint64_t>(width) + static_cast<uint64_t>(x);
         for (int s = 0; s < samples; ++s) {
-          RandomStream random(options.seed, RandomPurpose::kPathTracing, pixel, static_cast<uint32_t>(s));
+          RandomStream random =
+              RandomStream::even(options.seed, RandomPurpose::kPathTracing, pixel, static_cast<uint32_t>(s));
           const vec2 position = vec2(static_cast<float>(x), static_cast<float>(y)) + random.uniform2();
           float coverage = 0.0f;
-          const glm::dvec3 value(trace_path(scene, camera.ray(position), options, random, &coverage));
+          const glm::dvec3 value(trace_path(scene, rays(position), options, random, &coverage));
           sum += value;
           sum_of_squares += value * value;
           covered += coverage;

@@ -26,7 +26,8 @@ vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const
 struct Render {
   Image radiance;      // [H,W,3] linear HDR, premultiplied by coverage when the environment is not shown
   Image coverage;      // [H,W,1] share of camera rays that hit a surface, [0,1]
-  Image variance;      // [H,W,3] of the pixel's mean (sample variance / samples), for z-tests and noise-aware stopping
+  Image variance;      // [H,W,3] sample variance / samples: of the pixel's mean were its samples independent; being spread evenly
+                       // (RandomStream::even), they vary less, so it is an upper bound
 };
 Render render(const Scene& scene, const Camera& camera, const PathOptions& options, const Progress& progress = {},
               std::string_view task = "render");

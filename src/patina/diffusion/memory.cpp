@@ -1,0 +1,43 @@
+// How much memory a run will take. Weights are counted; activations follow from the widths of the networks
+// and two constants that were measured (docs/performance.md, "Memory").
+#include <algorithm>
+
+#include "patina/diffusion/detail_run.h"
+
+namespace patina::diffusion {
+namespace {
+
+/// At its peak, on the way up at the finest level, the U-Net holds so many times its finest feature map: what
+/// the way down and the ControlNets left, and a layer's input, output and scratch.
+constexpr double kUNetMaps = 20;
+/// The VAE in its last convolutions, in feature maps of its finest level.
+constexpr double kVaeMaps = 4;
+
+}  // namespace
+
+DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
+                            const DetailOptions& options) {
+  const Model::State& networks = model.state();
+  const int64_t bytes = networks.dtype == Dtype::kBf16 ? 2 : 4;
+  const int64_t text = networks.text_encoder.num_parameters() * bytes,
+                vae = networks.vae.num_parameters() * 4,
+                tile = networks.controlnet_tile.num_parameters() * bytes,
+                normal = networks.controlnet_normal.num_parameters() * bytes;
+  DetailMemory memory;
+  memory.weights = networks.unet.num_parameters() * bytes;
+  memory.weights +=
+      networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal});
+
+  const double pixels = static_cast<double>(view_width) * view_height, views = grid * grid;
+  const double latents = views * pixels / (model.latent_scale() * model.latent_scale());
+  const double batch = guidance_scale_of(options, networks.scheduler) == 1 ? 1 : 2;
+  const double unet = kUNetMaps *
+                      static_cast<double>(networks.unet.config().levels.front().channels * bytes) * latents *
+                      batch;
+  const double decoder =
+      kVaeMaps * static_cast<double>(networks.vae.config().block_out_channels.front()) * 4 * pixels;
+  memory.activations = static_cast<int64_t>(std::max(unet, decoder));
+  return memory;
+}
+
+}  // namespace patina::diffusion
