@@ -97,8 +97,8 @@ nlohmann::json measure(const Options& options) {
                    text = at::randn({1, 77, 768});
   const std::string size = std::to_string(options.side * options.grid);
   FlopCount count(unet_weights);
-  unet({sample, time, text, nullptr}, count.recorder());
-  const auto evaluate = [&] { unet({sample, time, text, nullptr}); };
+  unet({sample, time, text}, count.recorder());
+  const auto evaluate = [&] { unet({sample, time, text}); };
   const double seconds = best_seconds(options.repeat, evaluate);
   result["unet_" + size + "_seconds"] = seconds;
   result["unet_gflop"] = count.flops() * 1e-9;

@@ -93,8 +93,7 @@ at::Tensor velocity_error(const Networks& networks, const DenoiserBatch& batch, 
       scaled(networks.tile(noisy, times, text, networks.tile.hint(batch.tile), 1.0f), tile_scale);
   const ControlResiduals normal =
       scaled(networks.normal(noisy, times, text, networks.normal.hint(batch.normal), 1.0f), normal_scale);
-  const ControlResiduals control = sum(tile, normal);
-  const at::Tensor predicted = networks.unet({noisy, times, text, &control}).to(at::kFloat);
+  const at::Tensor predicted = networks.unet({noisy, times, text, sum(tile, normal)}).to(at::kFloat);
   return (predicted - velocity).square().mean({1, 2, 3});
 }
 

@@ -284,7 +284,7 @@ void check_unet_controlnets(const Stored& stored, Parts& parts, Comparison& comp
                             network.hint(stored["cond_" + name]), scales[index++].item<float>()));
   }
   compare_residuals(residuals, "sum_", stored, comparison);
-  inputs.control = &residuals;
+  inputs.control = residuals;
   comparison.add("out", parts.unet()(inputs), stored["out"], kModuleLimit);
 }
 

@@ -33,7 +33,7 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
                                                      bias_controls ? bias : nullptr));
   }
   const at::Tensor out =
-      (*unet)({sample, timesteps, text, residuals.mid.defined() ? &residuals : nullptr, bias}, record)
+      (*unet)({sample, timesteps, text, std::move(residuals), bias}, record)
           .to(at::kFloat)
           .contiguous();
   if (batch == 1) return {out, out, out};

@@ -157,7 +157,7 @@ UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.
 UNet::UNet(const std::filesystem::path& folder, at::ScalarType type)
     : UNet(load_network<UNet>(open_unet(folder), type)) {}
 
-at::Tensor UNet::operator()(const UNetInputs& inputs, const nn::Recorder& record) const {
+at::Tensor UNet::operator()(UNetInputs inputs, const nn::Recorder& record) const {
   const UNetConfig& config = encoder_.config;
   PATINA_CHECK_EQ(inputs.sample.dim(), 4);
   PATINA_CHECK_EQ(inputs.sample.size(1), config.in_channels);
@@ -169,10 +169,14 @@ at::Tensor UNet::operator()(const UNetInputs& inputs, const nn::Recorder& record
   const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.to(type_), inputs.bias,
                               record};
   auto [skips, h] = encoder_(encoder_.conv_in(sample, record), conditions);
-  if (inputs.control) {
-    PATINA_CHECK_EQ(inputs.control->down.size(), skips.size());
-    for (size_t i = 0; i < skips.size(); ++i) skips[i] = skips[i] + inputs.control->down[i];
-    h = h + inputs.control->mid;
+  ControlResiduals& control = inputs.control;
+  if (control.mid.defined()) {
+    PATINA_CHECK_EQ(control.down.size(), skips.size());
+    for (size_t i = 0; i < skips.size(); ++i) {
+      skips[i] = skips[i] + control.down[i];
+      control.down[i].reset();
+    }
+    h = h + control.mid;
   }
 
   // Up, taking the kept outputs last first.

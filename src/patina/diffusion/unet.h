@@ -71,7 +71,7 @@ struct UNetInputs {
   at::Tensor sample;     // [B,C,H,W] scaled latents
   at::Tensor timesteps;  // [1] or [B] f32
   at::Tensor text;       // [B,T,D]
-  const ControlResiduals* control = nullptr;
+  ControlResiduals control = {};  // may be empty
   const nn::SelfAttentionBias* bias = nullptr;
 };
 
@@ -84,7 +84,8 @@ class UNet {
 
   /// The predicted noise (or what the scheduler's prediction type says), [B,C,H,W] in the type of the
   /// weights.
-  at::Tensor operator()(const UNetInputs& inputs, const nn::Recorder& record = {}) const;
+  /// Takes the inputs by value, since it lets go of each residual that is used up: move them in where memory counts.
+  at::Tensor operator()(UNetInputs inputs, const nn::Recorder& record = {}) const;
 
   const UNetConfig& config() const { return encoder_.config; }
   int64_t num_parameters() const { return num_parameters_; }
