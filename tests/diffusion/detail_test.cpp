@@ -156,6 +156,21 @@ TEST(Detail, options_are_felt) {
   EXPECT_TRUE(differs([](DetailOptions& o) { o.scheduler = Scheduler::kEuler; }));
 }
 
+TEST(Detail, predicted_memory_follows_views_guidance_and_what_stays_in_memory) {
+  DetailOptions options = short_options();
+  options.guidance_scale = 1;
+  const DetailMemory one = predict_memory(tiny_model(), 4, 128, 128, options),
+                     four = predict_memory(tiny_model(), 4, 256, 256, options);
+  EXPECT_GT(one.activations, 0);
+  EXPECT_EQ(four.activations, 4 * one.activations);
+  EXPECT_EQ(four.weights, one.weights);
+  options.guidance_scale = 7.5f;
+  EXPECT_EQ(predict_memory(tiny_model(), 4, 128, 128, options).activations, 2 * one.activations);
+
+  const Model streamed({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, 0, /*low_memory=*/true});
+  EXPECT_LT(predict_memory(streamed, 4, 128, 128, options).weights, one.weights);
+}
+
 TEST(Detail, bf16_stays_near_f32) {
   const Model model({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kBf16, 0});
   const DetailInputs inputs = made_inputs(1, 128);

@@ -2,6 +2,7 @@
 // it is made of.
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include <gtest/gtest.h>
@@ -28,8 +29,12 @@ struct Task {
   views::ViewSet views;
   std::vector<Image> edited;
 };
-Task make_task(int resolution = 40) {
+Task make_task(
+    int resolution = 40, const std::function<void(asset::Map&)>& lay = [](asset::Map&) {}) {
   Task task{make_world(Lighting::kConstant, 8, resolution), {}, {}};
+  for (auto& maps : task.world.maps)
+    for (asset::Map* map : {&maps.base_color, &maps.roughness, &maps.metallic, &maps.normal}) lay(*map);
+  task.world.scene.set_asset_materials(task.world.maps);
   task.views = view_of(task.world);
   render::PathOptions path;
   path.samples_per_pixel = 64;
@@ -103,6 +108,23 @@ TEST(fit, finds_base_colour_from_one_view) {
   ASSERT_EQ(static_cast<int>(result.loss.size()), options.iterations);
   EXPECT_TRUE(result.changed[0].base_color && result.changed[0].roughness && result.changed[0].normal);
   EXPECT_FALSE(result.changed[0].metallic);
+}
+
+TEST(fit, finds_textures_that_lie_on_the_surface_twice_each_way_or_once) {
+  for (const auto wrap : {asset::Wrap::kRepeat, asset::Wrap::kMirroredRepeat, asset::Wrap::kClampToEdge}) {
+    Task task = make_task(64, [&](asset::Map& map) {
+      map.uv_transform = mat3(2, 0, 0, 0, 2, 0, -0.3f, -0.4f, 1);
+      map.wrap_s = map.wrap_t = wrap;
+    });
+    const auto start = task.world.scene.materials();
+    inverse::FitOptions options = quick();
+    options.iterations = 80;
+    const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+    const double before = base_color_error(start, task, result),
+                 after = base_color_error(result.maps, task, result);
+    EXPECT_LT(after, 0.6 * before) << "wrap " << static_cast<int>(wrap) << ": " << before << " -> " << after;
+    EXPECT_EQ(result.maps[0].base_color.uv_transform, task.world.maps[0].base_color.uv_transform);
+  }
 }
 
 TEST(fit, is_the_same_for_any_number_of_threads) {

@@ -121,7 +121,7 @@ struct DetailHooks {
 
 /// Bytes that generate_detail needs for views of this size.
 struct DetailMemory {
-  int64_t weights = 0;      // of the networks that are in memory at once
+  int64_t weights = 0;      // of the networks that are in memory at once, and of the libraries
   int64_t activations = 0;  // what they compute on, at the most
 };
 DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,

@@ -1,5 +1,5 @@
 // How much memory a run will take. Weights are counted; activations follow from the widths of the networks
-// and two constants that were measured (docs/performance.md, "Memory").
+// and constants that were measured (docs/performance.md).
 #include <algorithm>
 
 #include "patina/diffusion/detail_run.h"
@@ -9,9 +9,11 @@ namespace {
 
 /// At its peak, on the way up at the finest level, the U-Net holds so many times its finest feature map: what
 /// the way down and the ControlNets left, and a layer's input, output and scratch.
-constexpr double kUNetMaps = 20;
+constexpr double kUNetMaps = 24;
 /// The VAE in its last convolutions, in feature maps of its finest level.
 constexpr double kVaeMaps = 4;
+/// LibTorch's libraries and what the allocator keeps from converting weights.
+constexpr int64_t kLibraryBytes = 350'000'000;
 
 }  // namespace
 
@@ -20,11 +22,11 @@ DetailMemory predict_memory(const Model& model, int grid, int view_width, int vi
   const Model::State& networks = model.state();
   const int64_t bytes = networks.dtype == Dtype::kBf16 ? 2 : 4;
   const int64_t text = networks.text_encoder.num_parameters() * bytes,
-                vae = networks.vae.num_parameters() * 4,
+                vae = networks.vae.num_parameters() * bytes,
                 tile = networks.controlnet_tile.num_parameters() * bytes,
                 normal = networks.controlnet_normal.num_parameters() * bytes;
   DetailMemory memory;
-  memory.weights = networks.unet.num_parameters() * bytes;
+  memory.weights = kLibraryBytes + networks.unet.num_parameters() * bytes;
   memory.weights +=
       networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal});
 
@@ -35,7 +37,7 @@ DetailMemory predict_memory(const Model& model, int grid, int view_width, int vi
                       static_cast<double>(networks.unet.config().levels.front().channels * bytes) * latents *
                       batch;
   const double decoder =
-      kVaeMaps * static_cast<double>(networks.vae.config().block_out_channels.front()) * 4 * pixels;
+      kVaeMaps * static_cast<double>(networks.vae.config().block_out_channels.front() * bytes) * pixels;
   memory.activations = static_cast<int64_t>(std::max(unet, decoder));
   return memory;
 }

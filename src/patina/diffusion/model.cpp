@@ -86,14 +86,13 @@ Model::Model(const ModelPaths& paths, const ModelOptions& options) {
   const Dtype dtype = resolve(options.dtype, parts.unet.table);
   const at::ScalarType type = dtype == Dtype::kBf16 ? at::kBFloat16 : at::kFloat;
   const bool resident = !options.low_memory;
-  state_ = std::unique_ptr<State>(
-      new State{dtype, Tokenizer(parts.tokenizer, parts.pad_id),
-                hold_network<TextEncoder>(parts.text_encoder, type, resident, parts.loras.text_encoder),
-                load_network<UNet>(parts.unet, type, &parts.loras.unet),
-                hold_network<Vae>(parts.vae, at::kFloat, resident),
-                hold_network<ControlNet>(parts.controlnet_tile, type, resident),
-                hold_network<ControlNet>(parts.controlnet_normal, type, resident), parts.scheduler,
-                load_words(parts.words, parts.text_encoder.config, type), parts.notes});
+  state_ = std::unique_ptr<State>(new State{
+      dtype, Tokenizer(parts.tokenizer, parts.pad_id),
+      hold_network<TextEncoder>(parts.text_encoder, type, resident, parts.loras.text_encoder),
+      load_network<UNet>(parts.unet, type, &parts.loras.unet), hold_network<Vae>(parts.vae, type, resident),
+      hold_network<ControlNet>(parts.controlnet_tile, type, resident),
+      hold_network<ControlNet>(parts.controlnet_normal, type, resident), parts.scheduler,
+      load_words(parts.words, parts.text_encoder.config, type), parts.notes});
   check_fit(*state_);
   if (parts.ask_prediction) {
     state_->scheduler.prediction = ask_prediction(state_->unet, state_->scheduler);

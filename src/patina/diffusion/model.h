@@ -20,7 +20,7 @@ struct Model::State {
   Tokenizer tokenizer;
   Held<TextEncoder> text_encoder;
   UNet unet;
-  Held<Vae> vae;  // always f32: decoding is a hundredth of the work, and the pixels show its rounding
+  Held<Vae> vae;
   Held<ControlNet> controlnet_tile, controlnet_normal;
   SchedulerConfig scheduler;
   LearnedWords words;

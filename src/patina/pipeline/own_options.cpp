@@ -108,7 +108,7 @@ Option preset_option() {
     const bool fast = c.preset == Preset::kFast;
     c.orbit.num_views = fast ? 4 : 16;
     c.detail.num_steps = fast ? 12 : 30;
-    c.samples_per_pixel = fast ? 32 : 256;
+    c.samples_per_pixel = fast ? 32 : 128;
     c.fit.iterations = fast ? 80 : 400;
     c.turntable_frames = fast ? 0 : 36;
   };
