@@ -112,10 +112,10 @@ at::Tensor tile(const std::vector<at::Tensor>& views, int64_t grid) {
 }
 
 /// The whole grid's condition image through a ControlNet's embedding.
-at::Tensor grid_hint(const ControlNet& network, const std::vector<Image>& views, int64_t grid) {
+at::Tensor grid_hint(const Held<ControlNet>& network, const std::vector<Image>& views, int64_t grid) {
   std::vector<at::Tensor> tensors;
   for (const Image& view : views) tensors.push_back(tensor_from_image(view));
-  return network.hint(tile(tensors, grid));
+  return network.use()->hint(tile(tensors, grid));
 }
 
 /// Posterior means of the start images, scaled to unit variance, as one grid [C,H,W].
@@ -170,10 +170,10 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
                                          prompts, options.clip_skip);
   run->denoiser = {
       &networks.unet,
-      {{&networks.controlnet_tile, grid_hint(*networks.controlnet_tile.use(), inputs.tile_views, sizes.grid),
+      {{&networks.controlnet_tile, grid_hint(networks.controlnet_tile, inputs.tile_views, sizes.grid),
         options.tile_scale},
-       {&networks.controlnet_normal,
-        grid_hint(*networks.controlnet_normal.use(), inputs.normal_views, sizes.grid), options.normal_scale}},
+       {&networks.controlnet_normal, grid_hint(networks.controlnet_normal, inputs.normal_views, sizes.grid),
+        options.normal_scale}},
       text,
       guidance_scale,
       &run->bias,
