@@ -3,7 +3,7 @@
 
     python3 bench/compare_cycles.py --build build/release --shared ../shared [--out build/bench] [--samples 512] [--size 320]
 
-Needs Debian's `blender` and the program bench_render_view. Writes OUT/cycles_<asset>.png (patina, Cycles, half grey plus four
+Needs Debian's `blender` and `python3-numpy` and the program bench_render_view. Writes OUT/cycles_<asset>.png (patina, Cycles, half grey plus four
 times their difference), the EXR files, and OUT/cycles.json with the numbers that docs/cycles.md explains.
 """
 import argparse

@@ -80,14 +80,26 @@ double base_color_error(const std::vector<asset::MaterialMaps>& maps, const Task
   return error / weight;
 }
 
-TEST(fit, finds_base_colour_from_one_view) {
-  Task task = make_task(64);
+// A fit that is long enough to find the textures, and the errors of the base colours that it began and ended
+// with.
+struct Found {
+  inverse::FitResult result;
+  double before, after;
+};
+constexpr int kEnoughIterations = 80;
+Found find_textures(Task& task) {
   const auto start = task.world.scene.materials();
   inverse::FitOptions options = quick();
-  options.iterations = 80;
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  options.iterations = kEnoughIterations;
+  auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
   const double before = base_color_error(start, task, result),
                after = base_color_error(result.maps, task, result);
+  return {std::move(result), before, after};
+}
+
+TEST(fit, finds_base_colour_from_one_view) {
+  Task task = make_task(64);
+  const auto [result, before, after] = find_textures(task);
   EXPECT_LT(after, 0.5 * before) << before << " -> " << after;
   EXPECT_GT(result.psnr, 25.0f);
 
@@ -96,7 +108,7 @@ TEST(fit, finds_base_colour_from_one_view) {
   path.samples_per_pixel = 64;
   const Image rendered = tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f);
   const Image weight =
-      inverse::loss_weight(task.views.views[0].gbuffer, {true, true}, options.boundary_pixels);
+      inverse::loss_weight(task.views.views[0].gbuffer, {true, true}, quick().boundary_pixels);
   double error = 0, count = 0;
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
@@ -105,7 +117,7 @@ TEST(fit, finds_base_colour_from_one_view) {
       error += glm::dot(d, d) / 3.0f, count += 1;
     }
   EXPECT_GT(-10.0 * std::log10(error / count), result.psnr - 1.0f);
-  ASSERT_EQ(static_cast<int>(result.loss.size()), options.iterations);
+  ASSERT_EQ(static_cast<int>(result.loss.size()), kEnoughIterations);
   EXPECT_TRUE(result.changed[0].base_color && result.changed[0].roughness && result.changed[0].normal);
   EXPECT_FALSE(result.changed[0].metallic);
 }
@@ -116,12 +128,7 @@ TEST(fit, finds_textures_that_lie_on_the_surface_twice_each_way_or_once) {
       map.uv_transform = mat3(2, 0, 0, 0, 2, 0, -0.3f, -0.4f, 1);
       map.wrap_s = map.wrap_t = wrap;
     });
-    const auto start = task.world.scene.materials();
-    inverse::FitOptions options = quick();
-    options.iterations = 80;
-    const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
-    const double before = base_color_error(start, task, result),
-                 after = base_color_error(result.maps, task, result);
+    const auto [result, before, after] = find_textures(task);
     EXPECT_LT(after, 0.6 * before) << "wrap " << static_cast<int>(wrap) << ": " << before << " -> " << after;
     EXPECT_EQ(result.maps[0].base_color.uv_transform, task.world.maps[0].base_color.uv_transform);
   }

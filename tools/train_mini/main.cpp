@@ -30,8 +30,10 @@ constexpr const char* kUsage =
     "       train_mini words WORK MODEL                       teach the text encoder what words look like\n"
     "       train_mini denoiser WORK MODEL                    train text encoder, U-Net and ControlNets\n"
     "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects, fixed prompts\n"
-    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero); of vae and\n"
-    "denoiser: --batch N, --cuda; of denoiser: --from-model (begin with the weights that MODEL has)\n"
+    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero), --seed S (0); "
+    "of\n"
+    "vae and denoiser: --batch N, --cuda; of denoiser: --from-model (begin with the weights that MODEL has;\n"
+    "with another seed than theirs, or it sees the same noise again)\n"
     "Each goes on where it was stopped or killed; words, which takes a minute, is refused once there is a\n"
     "text encoder. MODEL holds config.json of every component and gets the weights.\n";
 

@@ -1,5 +1,5 @@
 // How much memory a run will take. Weights are counted; activations follow from the widths of the networks
-// and constants that were measured (docs/performance.md).
+// and constants that were fitted to measurements (docs/performance.md).
 #include <algorithm>
 
 #include "patina/diffusion/detail_run.h"
@@ -10,7 +10,8 @@ namespace {
 /// At its peak, on the way up at the finest level, the U-Net holds so many times its finest feature map: what
 /// the way down and the ControlNets left, and a layer's input, output and scratch.
 constexpr double kUNetMaps = 24;
-/// The VAE in its last convolutions, in feature maps of its finest level.
+/// The VAE in its last convolutions, in feature maps of its finest level: an estimate, since the U-Net was
+/// the larger in every run that was measured.
 constexpr double kVaeMaps = 4;
 /// LibTorch's libraries and what the allocator keeps from converting weights.
 constexpr int64_t kLibraryBytes = 350'000'000;

@@ -121,7 +121,8 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     const int64_t bytes_before = resident_bytes();
     std::optional<diffusion::Model> own_model;
     std::optional<diffusion::Model>& model = shared_model ? *shared_model : own_model;
-    if (!model)
+    const bool loads = !model;  // else its weights are among the bytes before
+    if (loads)
       model.emplace(config.model,
                     diffusion::ModelOptions{config.dtype, config.num_threads, config.low_memory});
     const double load_seconds = seconds_since(start);
@@ -147,16 +148,17 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
       write_image(run.file(result.outputs.back()), edited[v]);
     }
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model->latent_channels());
-    result.metrics = {{"noise", prepared.noise_metrics},
-                      {"model", model->description()},
-                      {"latent_pixels", latent_pixels},
-                      {"memory_mb",
-                       {{"predicted", megabytes(bytes_before + memory.weights + memory.activations)},
-                        {"peak", megabytes(peak_resident_bytes())}}},
-                      {"seconds",
-                       {{"load", load_seconds},
-                        {"noise", prepared.noise_seconds},
-                        {"correspond", prepared.correspond_seconds}}}};
+    result.metrics = {
+        {"noise", prepared.noise_metrics},
+        {"model", model->description()},
+        {"latent_pixels", latent_pixels},
+        {"memory_mb",
+         {{"predicted", megabytes(bytes_before + (loads ? memory.weights : 0) + memory.activations)},
+          {"peak", megabytes(peak_resident_bytes())}}},
+        {"seconds",
+         {{"load", load_seconds},
+          {"noise", prepared.noise_seconds},
+          {"correspond", prepared.correspond_seconds}}}};
     return result;
   });
   return load_edited(views, run);
