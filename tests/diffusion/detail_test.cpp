@@ -2,12 +2,17 @@
 // honest about its inputs.
 #include "patina/diffusion/detail.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
+#include <ATen/ATen.h>
+#include <c10/core/InferenceMode.h>
+
 #include "../support.h"
 #include "patina/base/error.h"
+#include "patina/diffusion/vae.h"
 #include "patina/nn/safetensors.h"
 #include "small_runs.h"
 
@@ -56,6 +61,7 @@ TEST(Detail, without_bias_it_is_the_reference_controlnet_image_to_image) {
   options.num_steps = 6, options.strength = 0.8f;
   options.tile_scale = 0.8f, options.normal_scale = 0.7f;
   options.scheduler = Scheduler::kDdim;
+  options.fine_detail = 0;  // which the reference has not
   const std::vector<Image> views = run(inputs, options);
   ASSERT_EQ(views.size(), 1u);
   EXPECT_LT(max_difference(views[0], image_of(golden, "decoded_01")), 5e-4 + 1e-4);
@@ -153,7 +159,41 @@ TEST(Detail, options_are_felt) {
   EXPECT_TRUE(differs([](DetailOptions& o) { o.strength = 0.4f; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.tile_scale = 0; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.normal_scale = 0.5f; }));
+  EXPECT_TRUE(differs([](DetailOptions& o) { o.fine_detail = 0.5f; }));
   EXPECT_TRUE(differs([](DetailOptions& o) { o.scheduler = Scheduler::kEuler; }));
+}
+
+TEST(Detail, what_the_vae_loses_of_the_renders_comes_back) {
+  const DetailInputs inputs = made_inputs(1, 64);
+  const Image& render = inputs.tile_views[0];
+  const c10::InferenceMode inference;
+  const Vae vae(test::data_dir() / "tiny-sd" / "vae", at::kFloat);
+  const at::Tensor image = at::from_blob(const_cast<float*>(render.pixels.data()), {1, 64, 64, 3}, at::kFloat)
+                               .permute({0, 3, 1, 2});
+  const at::Tensor lost =
+      (image - (0.5 * vae.decode(vae.encode(2 * image - 1).mean) + 0.5)).permute({0, 2, 3, 1}).contiguous();
+  const float* loss = lost.data_ptr<float>();
+
+  struct Setting {
+    float fine_detail, tile_scale, expected;
+  };
+  for (const Setting setting : {Setting{1, 1, 1}, {0.5f, 1, 0.5f}, {1, 0.4f, 0.4f}, {1, 1.5f, 1}}) {
+    DetailOptions options = short_options();
+    options.tile_scale = setting.tile_scale;
+    options.fine_detail = 0;
+    const Image without = run(inputs, options)[0];
+    options.fine_detail = setting.fine_detail;
+    const Image with = run(inputs, options)[0];
+    int compared = 0;
+    for (size_t i = 0; i < with.pixels.size(); ++i) {
+      const bool clamped = without.pixels[i] <= 0 || without.pixels[i] >= 1;
+      if (clamped) continue;  // what it was before is not known
+      const float expected = std::clamp(without.pixels[i] + setting.expected * loss[i], 0.0f, 1.0f);
+      ASSERT_NEAR(with.pixels[i], expected, 1e-5f) << i;
+      ++compared;
+    }
+    EXPECT_GT(compared, 1000);
+  }
 }
 
 TEST(Detail, predicted_memory_follows_views_guidance_and_what_stays_in_memory) {

@@ -97,6 +97,11 @@ TEST(Enhance, writes_asset_report_and_metrics) {
     EXPECT_GT(stage.at("peak_rss_mb").get<double>(), 1);
   }
   EXPECT_EQ(stages, (std::vector<std::string>{"render", "detail", "fit", "report"}));
+  // The backdrop stays as it was, and the model changed the rest.
+  const Image tile = read_image(run / "views" / "tile_00.png"),
+              edited = read_image(run / "detail" / "edited_00.png");
+  for (int x = 0; x < tile.width; ++x) EXPECT_EQ(edited.rgb(x, 0), tile.rgb(x, 0));
+  EXPECT_NE(edited.pixels, tile.pixels);
   EXPECT_GT(fs::file_size(run / "report.html"), 10000u);
   EXPECT_GT(fs::file_size(run / "turntable.webp"), 1000u);
   EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "config.json")).at("options").at("prompt"),

@@ -1,4 +1,6 @@
 // The orbit rig: where cameras stand and what they look at.
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "patina/base/error.h"
@@ -76,11 +78,58 @@ TEST(Orbit, bounding_sphere_just_touches_the_image_edges) {
   EXPECT_NEAR(bottom, 512.0f, 0.05f);
 }
 
+/// A plank of four corners, longer along x than along y and z.
+asset::Asset plank() {
+  asset::Asset asset;
+  asset::Primitive& primitive = asset.primitives.emplace_back();
+  primitive.p_world = {vec3(-2, 0, 0), vec3(2, 0, 0.3f), vec3(2, 1, 0), vec3(-2, 1, 0.3f)};
+  primitive.triangles = {uvec3(0, 1, 2), uvec3(0, 2, 3)};
+  return asset;
+}
+
+TEST(Orbit, an_asset_fills_its_views_to_the_margin_and_lies_in_their_middle) {
+  const asset::Asset asset = plank();
+  for (const float fov_y : {0.2f, 0.6f, 1.2f})
+    for (const int num_views : {1, 4, 9, 24}) {
+      OrbitOptions options;
+      options.num_views = num_views, options.fov_y = fov_y;
+      options.elevations = {-0.3f, 0.5f};
+      float nearest_edge = 1e9f;
+      for (const auto& camera : orbit_cameras(asset, options)) {
+        vec2 low(1e9f), high(-1e9f);
+        for (const vec3& p : asset.primitives[0].p_world) {
+          const auto projection = camera.project(p);
+          ASSERT_TRUE(projection);
+          low = glm::min(low, projection->pixel), high = glm::max(high, projection->pixel);
+        }
+        EXPECT_LT(glm::length(low + high - 512.0f), 190.0f * fov_y);  // but for perspective
+        nearest_edge = std::min({nearest_edge, low.x, low.y, 512.0f - high.x, 512.0f - high.y});
+      }
+      EXPECT_NEAR(nearest_edge, 512.0f / 32, 0.05f) << fov_y << " " << num_views;
+    }
+}
+
+TEST(Orbit, a_spike_toward_the_eye_keeps_its_distance) {
+  asset::Asset asset;
+  asset::Primitive& primitive = asset.primitives.emplace_back();
+  primitive.p_world = {vec3(0, 0, 10), vec3(0.1f, 0, -10), vec3(0, 0.1f, -10)};
+  primitive.triangles = {uvec3(0, 1, 2)};
+  OrbitOptions options;
+  options.num_views = 1, options.elevations = {0.0f};
+  const asset::Bounds bounds = asset::bounds(asset);
+  const float sphere = glm::length(orbit_cameras(bounds, options)[0].position() - bounds.center());
+  EXPECT_NEAR(glm::length(orbit_cameras(asset, options)[0].position() - bounds.center()), 0.5f * sphere,
+              1e-3f);
+}
+
 TEST(Orbit, given_distance_is_kept) {
   OrbitOptions options;
   options.distance = 7.5f;
   for (const auto& camera : orbit_cameras(kBounds, options))
     EXPECT_NEAR(glm::length(camera.position() - kBounds.center()), 7.5f, 1e-4f);
+  const asset::Asset asset = plank();
+  for (const auto& camera : orbit_cameras(asset, options))
+    EXPECT_NEAR(glm::length(camera.position() - asset::bounds(asset).center()), 7.5f, 1e-4f);
 }
 
 TEST(Orbit, rejects_values_out_of_range) {

@@ -108,7 +108,7 @@ std::string clean_caption(Draw& draw, const std::string& object, const std::stri
   return maybe_decorated(draw, out);
 }
 
-std::string unchanged_caption(Draw& draw, const std::string& object) {
+std::string untouched_caption(Draw& draw, const std::string& object) {
   const std::string how =
       draw.of(Words{"clean", "new", "clean new", "brand new", "pristine", "shiny new", "clean and new"});
   const std::string out =

@@ -10,11 +10,10 @@
 namespace patina::mini_data {
 namespace {
 
-// Of all samples: aged ones, and those that a caption leaves as they are; the rest is made of another
-// material altogether, which has as many names as ageing has and needs as many examples.
-constexpr float kAged = 0.5f, kUnchanged = 0.14f;
-// Share of the unchanged whose caption names no material: "a clean new kettle" changes nothing.
-constexpr float kUnnamed = 0.5f;
+// Of all samples: aged ones, those that "a clean new kettle" leaves as they are, of any parts and colours,
+// and those whose caption names the material that they have already; the rest is made of another material
+// altogether, which has as many names as ageing has and needs as many examples.
+constexpr float kAged = 0.48f, kUntouched = 0.14f, kNamed = 0.05f;
 
 Strength strength_of(Draw& draw, int level) {
   switch (level) {
@@ -103,10 +102,15 @@ void clean(const Catalog& catalog, Draw& draw, const CleanRecipe& recipe, bool r
     plan.clean[1] = plan.clean[0];
   }
   plan.asked_class = recipe.name;
-  const std::string object = object_word(catalog, draw, plan);
-  plan.caption = !remake && draw.chance(kUnnamed)
-                     ? unchanged_caption(draw, object)
-                     : clean_caption(draw, object, draw.of(recipe.words), recipe.asked_for);
+  plan.caption =
+      clean_caption(draw, object_word(catalog, draw, plan), draw.of(recipe.words), recipe.asked_for);
+}
+
+void untouched(const Catalog& catalog, Draw& draw, Plan& plan) {
+  plan.clean[0] = any_clean(draw).surface(catalog, draw);
+  divide(catalog, draw, plan);
+  plan.asked_class = "untouched";
+  plan.caption = untouched_caption(draw, object_word(catalog, draw, plan));
 }
 
 }  // namespace
@@ -132,7 +136,9 @@ Plan draw_plan(const Catalog& catalog, uint64_t seed, uint64_t index, const Plan
   if (kind < kAged) {
     const float level = draw(0, 1);
     age(catalog, draw, draw.of(age_recipes()), level < 0.25f ? 0 : level < 0.7f ? 1 : 2, plan);
-  } else if (kind < kAged + kUnchanged) {
+  } else if (kind < kAged + kUntouched) {
+    untouched(catalog, draw, plan);
+  } else if (kind < kAged + kUntouched + kNamed) {
     clean(catalog, draw, draw.of(clean_recipes()), false, plan);
   } else {
     // Only what a prompt can name: "painted" says no colour, and the object's own would be as right.

@@ -45,6 +45,6 @@ std::string aged_caption(Draw& draw, const AgeRecipe& age, const std::string& ob
 /// `is_noun`: whether an object can be made of it ("stone"), or only be so ("painted").
 std::string clean_caption(Draw& draw, const std::string& object, const std::string& material, bool is_noun);
 /// Of an object that stays as it is.
-std::string unchanged_caption(Draw& draw, const std::string& object);
+std::string untouched_caption(Draw& draw, const std::string& object);
 
 }  // namespace patina::mini_data

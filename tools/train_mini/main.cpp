@@ -30,10 +30,9 @@ constexpr const char* kUsage =
     "       train_mini words WORK MODEL                       teach the text encoder what words look like\n"
     "       train_mini denoiser WORK MODEL                    train text encoder, U-Net and ControlNets\n"
     "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects, fixed prompts\n"
-    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero), --seed S (0); "
-    "of\n"
-    "vae and denoiser: --batch N, --cuda; of denoiser: --from-model (begin with the weights that MODEL has;\n"
-    "with another seed than theirs, or it sees the same noise again)\n"
+    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero); of them and of\n"
+    "samples: --seed S (0); of vae and denoiser: --batch N, --cuda; of denoiser: --from-model (begin with the\n"
+    "weights that MODEL has; with another seed than theirs, or it sees the same noise again)\n"
     "Each goes on where it was stopped or killed; words, which takes a minute, is refused once there is a\n"
     "text encoder. MODEL holds config.json of every component and gets the weights.\n";
 
@@ -104,6 +103,7 @@ int run(const std::string& command, Arguments arguments) {
     SampleOptions options;
     options.device = device;
     options.count = arguments.count;
+    options.seed = arguments.run.seed;
     make_samples(names[0], fs::path(names[1]) / "training", options, mini_data::console_progress());
     options.part = mini_data::Part::kHeldOut;
     options.count = arguments.count / 20;

@@ -2,6 +2,7 @@
 // all; the U-Net and the ControlNets see the whole grid, so that their self-attention crosses views.
 #include "patina/diffusion/detail.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <ATen/ATen.h>
@@ -21,9 +22,14 @@ Image image_from_tensor(const at::Tensor& tensor) {
   return image;
 }
 
-/// sRGB views in [0,1] from the grid's latents.
+/// What the VAE loses of an image [1,3,H,W] in [0,1]: lettering, thin lines, the edges of silhouettes.
+at::Tensor lost_detail(const Vae& vae, const at::Tensor& image) {
+  return image - (0.5 * vae.decode(vae.encode(2 * image - 1).mean) + 0.5);
+}
+
+/// sRGB views in [0,1] from the grid's latents, and `share` of what the VAE loses of the renders.
 std::vector<Image> decode_views(const Vae& vae, std::vector<float>& latents, const GridSizes& sizes,
-                                const Progress& progress) {
+                                const std::vector<Image>& renders, float share, const Progress& progress) {
   const int64_t channels = vae.config().latent_channels, height = sizes.latent_height,
                 width = sizes.latent_width;
   const at::Tensor grid =
@@ -33,9 +39,11 @@ std::vector<Image> decode_views(const Vae& vae, std::vector<float>& latents, con
   for (int64_t row = 0; row < sizes.grid; ++row) {
     for (int64_t column = 0; column < sizes.grid; ++column) {
       progress.throw_if_stopped();
-      const at::Tensor view =
-          grid.slice(2, row * height, (row + 1) * height).slice(3, column * width, (column + 1) * width);
-      views.push_back(image_from_tensor(at::clamp(vae.decode(view) * 0.5 + 0.5, 0, 1)));
+      at::Tensor view = 0.5 * vae.decode(grid.slice(2, row * height, (row + 1) * height)
+                                             .slice(3, column * width, (column + 1) * width)) +
+                        0.5;
+      if (share > 0) view = view + share * lost_detail(vae, tensor_from_image(renders[views.size()]));
+      views.push_back(image_from_tensor(at::clamp(view, 0, 1)));
       progress.update("decode", static_cast<double>(views.size()),
                       static_cast<double>(sizes.grid * sizes.grid));
     }
@@ -71,7 +79,8 @@ std::vector<Image> generate_detail(const Model& model, const DetailInputs& input
                   "(try f32)");
     }
   }
-  return decode_views(*model.state().vae.use(), latents, run->sizes, progress);
+  return decode_views(*model.state().vae.use(), latents, run->sizes, inputs.tile_views,
+                      options.fine_detail * std::min(options.tile_scale, 1.0f), progress);
 }
 
 }  // namespace patina::diffusion

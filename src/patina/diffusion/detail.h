@@ -102,6 +102,9 @@ struct DetailOptions {
   float guidance_scale = kAutoGuidanceScale;  // 1: no guidance, one evaluation a step
   float strength = 1.0f;                      // (0,1]: share of the steps that is run [Meng2022]
   float tile_scale = 1.0f, normal_scale = 1.0f;
+  // [0,1], times tile_scale up to 1: share of what the VAE loses of the tile views that the edited views get
+  // back. The paper's edit and diffusers' have none of it.
+  float fine_detail = 1.0f;
   Scheduler scheduler = Scheduler::kUniPc;
   float bias_weight = 0;  // w; 0: no bias
   BiasScaling bias_scaling = BiasScaling::kPaper;
@@ -127,8 +130,8 @@ struct DetailMemory {
 DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
                             const DetailOptions& options);
 
-/// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4]. Encodes and decodes
-/// view by view. Returns grid² sRGB images [H,W,3] in [0,1]. Throws Error{kUsage} if sizes do not fit.
+/// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4], and what the VAE lost
+/// of the renders put back. Encodes and decodes view by view. Returns grid² sRGB images [H,W,3] in [0,1]. Throws Error{kUsage} if sizes do not fit.
 std::vector<Image> generate_detail(const Model& model, const DetailInputs& inputs,
                                    const DetailOptions& options, const DetailHooks& hooks,
                                    const Progress& progress);

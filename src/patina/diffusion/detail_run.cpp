@@ -89,16 +89,10 @@ GridSizes checked_sizes(const Model& model, const DetailInputs& inputs, const De
   in_range("strength", options.strength, 0, 1);
   in_range("tile scale", options.tile_scale, 0, 10);
   in_range("normal scale", options.normal_scale, 0, 10);
+  in_range("fine detail", options.fine_detail, 0, 1);
   in_range("bias", options.bias_weight, -1000, 1000);
   check_bias(inputs.bias_levels, sizes, model.state().unet.config().levels.size());
   return sizes;
-}
-
-/// [1,3,H,W] f32 from an image, values as they are.
-at::Tensor tensor_from_image(const Image& image) {
-  const at::Tensor pixels = at::from_blob(const_cast<float*>(image.pixels.data()),
-                                          {1, image.height, image.width, image.channels}, at::kFloat);
-  return pixels.permute({0, 3, 1, 2}).clone();
 }
 
 /// grid² tensors [1,C,h,w], row by row -> [1,C,grid·h,grid·w].
@@ -132,6 +126,12 @@ std::vector<float> start_latents(const Vae& vae, const std::vector<Image>& views
 }
 
 }  // namespace
+
+at::Tensor tensor_from_image(const Image& image) {
+  const at::Tensor pixels = at::from_blob(const_cast<float*>(image.pixels.data()),
+                                          {1, image.height, image.width, image.channels}, at::kFloat);
+  return pixels.permute({0, 3, 1, 2}).clone();
+}
 
 float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
   if (options.guidance_scale != kAutoGuidanceScale) return options.guidance_scale;

@@ -40,6 +40,9 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
                                         const DetailOptions& options, const std::optional<Checkpoint>& resume,
                                         const Progress& progress);
 
+/// [1,3,H,W] f32 from an image, values as they are.
+at::Tensor tensor_from_image(const Image& image);
+
 /// The scale that DetailOptions asks for, or the one that suits the scheduler.
 float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler);
 

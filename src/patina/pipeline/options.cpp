@@ -93,6 +93,16 @@ std::vector<Option> make_options() {
        .help = "Weight of ControlNet normal, which holds on to the shape.",
        .stages = kDetailStage},
       0.0f, 4.0f, [](Config & c) -> auto& { return c.detail.normal_scale; }));
+  add(number_option<float>(
+      {.name = "fine-detail",
+       .aliases = {},
+       .group = edit,
+       .placeholder = "SHARE",
+       .help =
+           "How much of what the VAE blurs in the renders (lettering, thin lines, edges) the edited views "
+           "get back, 0 to 1; a --tile-scale below 1 takes it down as well.",
+       .stages = kDetailStage},
+      0.0f, 1.0f, [](Config & c) -> auto& { return c.detail.fine_detail; }));
 
   add(text_option(
       {.name = "output",
@@ -245,7 +255,8 @@ std::vector<Option> make_options() {
        .aliases = {},
        .group = views,
        .placeholder = "METRES",
-       .help = "From the asset's centre to the cameras, metres; 0 makes the bounding sphere just fit.",
+       .help = "From the asset's centre to the cameras, metres; 0 goes as near as lets every view hold all "
+               "of it.",
        .stages = kRenderStage},
       0.0f, 1e12f, [](Config & c) -> auto& { return c.orbit.distance; }));
   add(text_option(

@@ -1,5 +1,6 @@
 // The second stage: noise and correspondences from the geometry, then the diffusion model over the whole
 // grid.
+#include <algorithm>
 #include <chrono>
 
 #include <fmt/format.h>
@@ -55,6 +56,12 @@ json noise_metrics(const correspond::NoiseField& noise, int grid) {
     replace_if_farther("ks_p", view.kolmogorov_smirnov_p, 1);
   }
   return worst;
+}
+
+// What is not to change does not: the backdrop, the surroundings, materials that were left out.
+void restore_where_nothing_changes(Image& edited, const Image& render, const std::vector<float>& coverage) {
+  for (size_t i = 0; i < coverage.size(); ++i)
+    if (coverage[i] == 0) std::copy_n(&render.pixels[3 * i], 3, &edited.pixels[3 * i]);
 }
 
 double megabytes(int64_t bytes) {
@@ -139,11 +146,11 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     };
     if (auto saved = run.load_checkpoint("detail", key))
       hooks.resume = diffusion::Checkpoint{.next_step = saved->step, .bytes = std::move(saved->bytes)};
-    const std::vector<Image> edited =
-        diffusion::generate_detail(*model, prepared.inputs, options, hooks, progress);
+    std::vector<Image> edited = diffusion::generate_detail(*model, prepared.inputs, options, hooks, progress);
 
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {
+      restore_where_nothing_changes(edited[v], views.tile[v], views.set.views[v].gbuffer.coverage);
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
     }

@@ -165,7 +165,7 @@ Workbench open_workbench(const Config& config, const Progress& progress) {
     if (config.orbit.resolution % 8 != 0)
       throw Error(ErrorCode::kUsage, "--resolution",
                   fmt::format("expected a multiple of 8, found {}", config.orbit.resolution));
-    bench.cameras = views::orbit_cameras(asset::bounds(bench.asset), config.orbit);
+    bench.cameras = views::orbit_cameras(bench.asset, config.orbit);
   }
   bench.scene =
       std::make_unique<render::Scene>(bench.asset, bench.maps, std::move(environment), bench.context.get(),
