@@ -12,12 +12,15 @@
 
 namespace patina::bench {
 
-/// How every edit of the benchmark is made: the defaults of `patina enhance` but for size and steps.
+/// How every edit of the benchmark is made: the defaults of `patina enhance` but for size, steps and what is
+/// asked for here.
 struct EditSettings {
   diffusion::ModelPaths model;
   int num_views = 4;
   int resolution = 256;
   int num_steps = 20;
+  float guidance_scale = diffusion::kAutoGuidanceScale;
+  float fine_detail = 1;
   int num_threads = 0;
 };
 pipeline::Config edit_config(const HeldOutAsset& asset, const EditSettings& settings);

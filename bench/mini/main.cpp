@@ -42,6 +42,7 @@ struct Arguments {
   std::vector<std::string> only;  // empty: all parts
   std::string demo;               // command line; empty: not measured
   int views = 4, ablation_views = 9, steps = 20, num_assets = 5, threads = 0;
+  float guidance_scale = diffusion::kAutoGuidanceScale, fine_detail = 1;
   std::vector<float> weights{0, 0.6f, 1.2f, 1.8f, 2.4f, 3};
 
   bool asks_for(const std::string& part) const {
@@ -105,6 +106,8 @@ void run(const Arguments& arguments) {
   EditSettings settings{.model = {},
                         .num_views = arguments.views,
                         .num_steps = arguments.steps,
+                        .guidance_scale = arguments.guidance_scale,
+                        .fine_detail = arguments.fine_detail,
                         .num_threads = arguments.threads};
   settings.model.model = arguments.model;
   EditSettings for_priors = settings;
@@ -196,6 +199,11 @@ int main(int argc, char** argv) {
   program.add_option("--ablation-views", arguments.ablation_views, "Views of the ablation and the sweep")
       ->capture_default_str();
   program.add_option("--steps", arguments.steps, "Steps of every edit")->capture_default_str();
+  program
+      .add_option("--guidance-scale", arguments.guidance_scale, "Of every edit; 0 is what suits the model")
+      ->capture_default_str();
+  program.add_option("--fine-detail", arguments.fine_detail, "Of every edit, as of patina enhance")
+      ->capture_default_str();
   program.add_option("--assets", arguments.num_assets, "How many of the five assets, for a quick look")
       ->check(CLI::Range(1, 5))
       ->capture_default_str();

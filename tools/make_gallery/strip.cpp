@@ -25,6 +25,19 @@ double change(const asset::Map& before, const asset::Map& after) {
   return count / static_cast<double>(a.pixels.size());
 }
 
+/// Surface of a material, metres².
+double area(const asset::Asset& asset, size_t material) {
+  double sum = 0;
+  for (const asset::Primitive& primitive : asset.primitives) {
+    if (primitive.material != static_cast<int>(material)) continue;
+    for (const uvec3& t : primitive.triangles) {
+      const vec3 &a = primitive.p_world[t.x], &b = primitive.p_world[t.y], &c = primitive.p_world[t.z];
+      sum += 0.5 * static_cast<double>(glm::length(glm::cross(b - a, c - a)));
+    }
+  }
+  return sum;
+}
+
 Image shown(const asset::Map& map, int side) {
   return srgb_from_linear(asset::resized(map, side, side).texels);
 }
@@ -43,7 +56,7 @@ Image strip(const fs::path& run, const asset::Asset& before, const asset::Asset&
   size_t most = 0;
   double largest = -1;
   for (size_t m = 0; m < new_maps.size(); ++m) {
-    const double changed = change(old_maps[m].base_color, new_maps[m].base_color);
+    const double changed = area(before, m) * change(old_maps[m].base_color, new_maps[m].base_color);
     if (changed > largest) most = m, largest = changed;
   }
   pictures.push_back(shown(old_maps[most].base_color, side));
