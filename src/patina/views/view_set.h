@@ -51,12 +51,12 @@ struct OrbitOptions {
   std::vector<float> elevations{glm::radians(20.0f)};  // radians, used in turn
   float azimuth_start = 0;                             // radians
   float fov_y = glm::radians(35.0f);
-  float distance = 0;  // metres from the centre; 0: the bounding sphere just fits
+  float distance = 0;  // metres from the centre; 0: so that all of the asset is seen
 };
 
-/// Cameras at equal steps of azimuth (360°/V) around the bounding sphere [Hadadan2025, Sec. 4]. Azimuth 0
-/// looks at the asset's front from +Z and grows toward +X; any number of views. Throws Error{kUsage} for
-/// values out of range.
+/// Cameras at equal steps of azimuth (360°/V) around the bounding sphere, which just fits the views where the
+/// distance is 0 [Hadadan2025, Sec. 4]. Azimuth 0 looks at the asset's front from +Z and grows toward +X; any
+/// number of views. Throws Error{kUsage} for values out of range.
 std::vector<render::Camera> orbit_cameras(const asset::Bounds& bounds, const OrbitOptions& options);
 
 /// The same around an asset. Where the distance is 0, every view has the asset in its middle, and all cameras
