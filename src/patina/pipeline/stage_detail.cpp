@@ -58,7 +58,7 @@ json noise_metrics(const correspond::NoiseField& noise, int grid) {
   return worst;
 }
 
-// What is not to change does not: the backdrop, the surroundings, materials that were left out.
+// What is not the asset does not change: the backdrop and its surroundings.
 void restore_where_nothing_changes(Image& edited, const Image& render, const std::vector<float>& coverage) {
   for (size_t i = 0; i < coverage.size(); ++i)
     if (coverage[i] == 0) std::copy_n(&render.pixels[3 * i], 3, &edited.pixels[3 * i]);
