@@ -10,9 +10,6 @@ import argparse
 import json
 import time
 
-import torch
-from diffusers import AutoencoderKL, UNet2DConditionModel
-
 UNET = dict(
     sample_size=64,
     in_channels=4,
@@ -49,6 +46,9 @@ def main():
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--no-compile", action="store_true")
     arguments = parser.parse_args()
+    import torch  # here, so that --help works without them
+    from diffusers import AutoencoderKL, UNet2DConditionModel
+
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     with open(arguments.report) as file:

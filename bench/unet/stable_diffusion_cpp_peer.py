@@ -16,11 +16,11 @@ import tempfile
 import time
 from importlib.metadata import version
 
-from stable_diffusion_cpp import StableDiffusion
-
 
 def seconds_of(checkpoint, threads, steps, direct):
     """Seconds of the best step and of the VAE's decoding."""
+    from stable_diffusion_cpp import StableDiffusion  # here, so that --help works without it
+
     engine = StableDiffusion(
         model_path=checkpoint,
         n_threads=threads,
@@ -54,7 +54,7 @@ def main():
     parser.add_argument("--make", required=True, help="the program make_checkpoint")
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--steps", type=int, default=3)
-    parser.add_argument("--direct", action="store_true")
+    parser.add_argument("--direct", action="store_true", help="flash attention and direct convolutions")
     arguments = parser.parse_args()
     with open(arguments.report) as file:
         report = json.load(file)

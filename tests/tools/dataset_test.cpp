@@ -238,6 +238,23 @@ TEST_F(Plans, captions_say_what_is_asked_for) {
           << recipe.name;
 }
 
+TEST_F(Plans, what_a_clean_prompt_leaves_alone_has_one_part_or_two) {
+  constexpr int kPlans = 1000;
+  int untouched = 0, divided = 0;
+  for (uint64_t index = 0; index < kPlans; ++index) {
+    const Plan plan = draw_plan(catalog_, 4, index, {});
+    if (plan.asked_class != "untouched") continue;
+    ++untouched;
+    divided += plan.division != Division::kNone;
+    EXPECT_TRUE(plan.layers.empty());
+    EXPECT_FALSE(plan.remade);
+    EXPECT_TRUE(plan.caption.empty() || says_any(plan.caption, {"clean", "new", "pristine"})) << plan.caption;
+  }
+  EXPECT_NEAR(untouched, 0.14 * kPlans, 4 * std::sqrt(kPlans * 0.14 * 0.86));
+  EXPECT_GT(divided, untouched / 5);
+  EXPECT_LT(divided, untouched * 3 / 5);
+}
+
 TEST_F(Plans, strength_words_go_with_the_amount) {
   double slight = 0, heavy = 0;
   for (uint64_t index = 0; index < 50; ++index) {

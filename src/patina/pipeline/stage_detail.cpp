@@ -58,8 +58,8 @@ json noise_metrics(const correspond::NoiseField& noise, int grid) {
   return worst;
 }
 
-// What is not the asset does not change: the backdrop and its surroundings.
-void restore_where_nothing_changes(Image& edited, const Image& render, const std::vector<float>& coverage) {
+// Where the asset is not, nothing may change: the backdrop and the scene around it.
+void restore_surroundings(Image& edited, const Image& render, const std::vector<float>& coverage) {
   for (size_t i = 0; i < coverage.size(); ++i)
     if (coverage[i] == 0) std::copy_n(&render.pixels[3 * i], 3, &edited.pixels[3 * i]);
 }
@@ -150,7 +150,7 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
 
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {
-      restore_where_nothing_changes(edited[v], views.tile[v], views.set.views[v].gbuffer.coverage);
+      restore_surroundings(edited[v], views.tile[v], views.set.views[v].gbuffer.coverage);
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
     }
