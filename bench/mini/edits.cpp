@@ -13,6 +13,7 @@ Config edit_config(const HeldOutAsset& asset, const EditSettings& settings) {
   config.orbit.resolution = settings.resolution;
   config.detail.num_steps = settings.num_steps;
   config.detail.guidance_scale = settings.guidance_scale;
+  config.detail.negative_prompt = settings.negative_prompt;
   config.detail.fine_detail = settings.fine_detail;
   config.turntable_frames = 0;
   config.num_threads = settings.num_threads;

@@ -20,6 +20,7 @@ struct EditSettings {
   int resolution = 256;
   int num_steps = 20;
   float guidance_scale = diffusion::kAutoGuidanceScale;
+  std::optional<std::string> negative_prompt = std::nullopt;
   float fine_detail = 1;
   int num_threads = 0;
 };

@@ -43,6 +43,7 @@ struct Arguments {
   std::string demo;               // command line; empty: not measured
   int views = 4, ablation_views = 9, steps = 20, num_assets = 5, threads = 0;
   float guidance_scale = diffusion::kAutoGuidanceScale, fine_detail = 1;
+  std::optional<std::string> negative_prompt;
   std::vector<float> weights{0, 0.6f, 1.2f, 1.8f, 2.4f, 3};
 
   bool asks_for(const std::string& part) const {
@@ -107,6 +108,7 @@ void run(const Arguments& arguments) {
                         .num_views = arguments.views,
                         .num_steps = arguments.steps,
                         .guidance_scale = arguments.guidance_scale,
+                        .negative_prompt = arguments.negative_prompt,
                         .fine_detail = arguments.fine_detail,
                         .num_threads = arguments.threads};
   settings.model.model = arguments.model;
@@ -202,6 +204,8 @@ int main(int argc, char** argv) {
   program
       .add_option("--guidance-scale", arguments.guidance_scale, "Of every edit; 0 is what suits the model")
       ->capture_default_str();
+  program.add_option("--negative-prompt", arguments.negative_prompt,
+                     "Of every edit, in place of the model's own");
   program.add_option("--fine-detail", arguments.fine_detail, "Of every edit, as of patina enhance")
       ->capture_default_str();
   program.add_option("--assets", arguments.num_assets, "How many of the five assets, for a quick look")

@@ -3,6 +3,7 @@
 #include "patina/diffusion/detail.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,6 +13,9 @@
 
 #include "../support.h"
 #include "patina/base/error.h"
+#include "patina/base/files.h"
+#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/fine_detail.h"
 #include "patina/diffusion/vae.h"
 #include "patina/nn/safetensors.h"
 #include "small_runs.h"
@@ -163,37 +167,96 @@ TEST(Detail, options_are_felt) {
   EXPECT_TRUE(differs([](DetailOptions& o) { o.scheduler = Scheduler::kEuler; }));
 }
 
+TEST(Detail, guidance_says_the_same_in_one_batch_and_in_two) {
+  const c10::InferenceMode inference;
+  DetailInputs inputs = made_inputs(2, 128);
+  inputs.bias_levels = same_place_bias(2, 16, 2);
+  DetailOptions options = short_options();
+  options.bias_weight = 1, options.bias_controlnet = true, options.guidance_scale = 7.5f;
+  const std::unique_ptr<DetailRun> run = start_detail(tiny_model(), inputs, options, std::nullopt, {});
+  const at::Tensor latents = at::from_blob(run->state.latents.data(), run->shape, at::kFloat);
+  run->denoiser.one_batch = true;
+  const Guided at_once = run->denoiser(latents, 601);
+  run->denoiser.one_batch = false;
+  const Guided in_turn = run->denoiser(latents, 601);
+  EXPECT_LT((at_once.unconditional - in_turn.unconditional).abs().max().item<double>(), 1e-5);
+  EXPECT_LT((at_once.conditional - in_turn.conditional).abs().max().item<double>(), 1e-5);
+  EXPECT_LT((at_once.guided - in_turn.guided).abs().max().item<double>(), 1e-4);
+  EXPECT_GT((at_once.conditional - at_once.unconditional).abs().max().item<double>(), 1e-3);
+}
+
+TEST(Detail, a_models_own_negative_prompt_holds_where_none_is_given) {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "model";
+  fs::copy(test::data_dir() / "tiny-sd", path, fs::copy_options::recursive);
+  write_file(path / "model_index.json",
+             std::string(R"({"_class_name": "StableDiffusionPipeline", "_negative_prompt": "blurry"})"));
+  const Model with_own({path, {}, {}, {}}, {Dtype::kF32, 0});
+  const DetailInputs inputs = made_inputs(1, 64);
+  const auto edited = [&](const Model& model, std::optional<std::string> negative_prompt) {
+    DetailOptions options = short_options();
+    options.negative_prompt = std::move(negative_prompt);
+    return generate_detail(model, inputs, options, {}, {})[0].pixels;
+  };
+  EXPECT_EQ(edited(with_own, std::nullopt), edited(tiny_model(), "blurry"));
+  EXPECT_EQ(edited(with_own, ""), edited(tiny_model(), std::nullopt));
+  EXPECT_EQ(edited(with_own, "a mossy stone"), edited(tiny_model(), "a mossy stone"));
+}
+
 TEST(Detail, what_the_vae_loses_of_the_renders_comes_back) {
   const DetailInputs inputs = made_inputs(1, 64);
-  const Image& render = inputs.tile_views[0];
   const c10::InferenceMode inference;
   const Vae vae(test::data_dir() / "tiny-sd" / "vae", at::kFloat);
-  const at::Tensor image = at::from_blob(const_cast<float*>(render.pixels.data()), {1, 64, 64, 3}, at::kFloat)
-                               .permute({0, 3, 1, 2});
+  const at::Tensor render = tensor_from_image(inputs.tile_views[0]);
   const at::Tensor lost =
-      (image - (0.5 * vae.decode(vae.encode(2 * image - 1).mean) + 0.5)).permute({0, 2, 3, 1}).contiguous();
+      (render - (0.5 * vae.decode(vae.encode(2 * render - 1).mean) + 0.5)).permute({0, 2, 3, 1}).contiguous();
   const float* loss = lost.data_ptr<float>();
-
-  struct Setting {
-    float fine_detail, tile_scale, expected;
-  };
-  for (const Setting setting : {Setting{1, 1, 1}, {0.5f, 1, 0.5f}, {1, 0.4f, 0.4f}, {1, 1.5f, 1}}) {
+  for (const auto& [asked, tile_scale, share] :
+       {std::array{1.0f, 1.0f, 1.0f}, {0.5f, 1.0f, 0.5f}, {1.0f, 0.4f, 0.4f}, {1.0f, 1.5f, 1.0f}}) {
     DetailOptions options = short_options();
-    options.tile_scale = setting.tile_scale;
+    options.tile_scale = tile_scale;
     options.fine_detail = 0;
     const Image without = run(inputs, options)[0];
-    options.fine_detail = setting.fine_detail;
+    options.fine_detail = asked;
     const Image with = run(inputs, options)[0];
+    const auto light = [](const float* rgb) {
+      return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
+    };
+    const auto clamped = [](const float* rgb) {
+      return *std::min_element(rgb, rgb + 3) <= 0 || *std::max_element(rgb, rgb + 3) >= 1;
+    };
     int compared = 0;
-    for (size_t i = 0; i < with.pixels.size(); ++i) {
-      const bool clamped = without.pixels[i] <= 0 || without.pixels[i] >= 1;
-      if (clamped) continue;  // what it was before is not known
-      const float expected = std::clamp(without.pixels[i] + setting.expected * loss[i], 0.0f, 1.0f);
-      ASSERT_NEAR(with.pixels[i], expected, 1e-5f) << i;
+    for (size_t i = 0; i < with.pixels.size(); i += 3) {
+      const float *before = &without.pixels[i], *after = &with.pixels[i];
+      if (clamped(before) || clamped(after)) continue;  // what it would have been is not known
+      ASSERT_NEAR(light(after) - light(before), share * light(loss + i), 1e-5f) << i;
       ++compared;
     }
     EXPECT_GT(compared, 1000);
   }
+}
+
+TEST(FineDetail, light_comes_back_whole_and_colour_where_the_edit_kept_it) {
+  const c10::InferenceMode inference;
+  const Vae vae(test::data_dir() / "tiny-sd" / "vae", at::kFloat);
+  const at::Tensor render = tensor_from_image(made_inputs(1, 64).tile_views[0]);
+  const at::Tensor kept = 0.5 * vae.decode(vae.encode(2 * render - 1).mean) + 0.5, lost = render - kept;
+  const auto farthest = [](const at::Tensor& a, const at::Tensor& b) {
+    return (a - b).abs().max().item<double>();
+  };
+  const at::Tensor darker = kept - 0.3;
+  EXPECT_LT(farthest(fine_detail(vae, render, kept), lost), 1e-6);
+  EXPECT_LT(farthest(fine_detail(vae, render, darker), lost), 1e-6) << "no colour has changed";
+
+  at::Tensor half = kept.clone();  // the right half turns red
+  half.slice(3, 32).select(1, 0) += 2;
+  const at::Tensor added = fine_detail(vae, render, half);
+  const at::Tensor light =
+      0.2126 * lost.select(1, 0) + 0.7152 * lost.select(1, 1) + 0.0722 * lost.select(1, 2);
+  EXPECT_LT(farthest(added.slice(3, 0, 20), lost.slice(3, 0, 20)), 1e-6);
+  for (int64_t channel = 0; channel < 3; ++channel)
+    EXPECT_LT(farthest(added.select(1, channel).slice(2, 44), light.slice(2, 44)), 1e-6);
+  EXPECT_GT(farthest(lost.select(1, 0), light), 0.01) << "there is colour to be lost";
 }
 
 TEST(Detail, predicted_memory_follows_views_guidance_and_what_stays_in_memory) {
@@ -206,6 +269,10 @@ TEST(Detail, predicted_memory_follows_views_guidance_and_what_stays_in_memory) {
   EXPECT_EQ(four.weights, one.weights);
   options.guidance_scale = 7.5f;
   EXPECT_EQ(predict_memory(tiny_model(), 4, 128, 128, options).activations, 2 * one.activations);
+  const int64_t guided = predict_memory(tiny_model(), 4, 1024, 1024, options).activations;
+  EXPECT_GT(guided, 64 * one.activations)
+      << "large maps one prompt after the other: what the second will read";
+  EXPECT_LT(guided, 64 * 1.5 * one.activations);
 
   const Model streamed({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, 0, /*low_memory=*/true});
   EXPECT_LT(predict_memory(streamed, 4, 128, 128, options).weights, one.weights);

@@ -10,6 +10,7 @@
 
 #include "patina/base/error.h"
 #include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/fine_detail.h"
 
 namespace patina::diffusion {
 namespace {
@@ -20,11 +21,6 @@ Image image_from_tensor(const at::Tensor& tensor) {
               static_cast<int>(pixels.size(3)));
   std::copy_n(pixels.data_ptr<float>(), image.pixels.size(), image.pixels.begin());
   return image;
-}
-
-/// What the VAE loses of an image [1,3,H,W] in [0,1]: lettering, thin lines, the edges of silhouettes.
-at::Tensor lost_detail(const Vae& vae, const at::Tensor& image) {
-  return image - (0.5 * vae.decode(vae.encode(2 * image - 1).mean) + 0.5);
 }
 
 /// sRGB views in [0,1] from the grid's latents, and `share` of what the VAE loses of the renders.
@@ -42,7 +38,7 @@ std::vector<Image> decode_views(const Vae& vae, std::vector<float>& latents, con
       at::Tensor view = 0.5 * vae.decode(grid.slice(2, row * height, (row + 1) * height)
                                              .slice(3, column * width, (column + 1) * width)) +
                         0.5;
-      if (share > 0) view = view + share * lost_detail(vae, tensor_from_image(renders[views.size()]));
+      if (share > 0) view = view + share * fine_detail(vae, tensor_from_image(renders[views.size()]), view);
       views.push_back(image_from_tensor(at::clamp(view, 0, 1)));
       progress.update("decode", static_cast<double>(views.size()),
                       static_cast<double>(sizes.grid * sizes.grid));

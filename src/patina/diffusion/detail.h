@@ -96,7 +96,8 @@ struct DetailInputs {
 inline constexpr float kAutoGuidanceScale = 0;
 
 struct DetailOptions {
-  std::string prompt = {}, negative_prompt = {};  // with weights as prompt.h reads them
+  std::string prompt = {};                                   // with weights as prompt.h reads it
+  std::optional<std::string> negative_prompt = std::nullopt;  // nullopt: the model's own, most often none
   int clip_skip = 1;  // 1: the whole text encoder; n leaves out its last n - 1 layers
   int num_steps = 20;
   float guidance_scale = kAutoGuidanceScale;  // 1: no guidance, one evaluation a step

@@ -46,6 +46,10 @@ at::Tensor tensor_from_image(const Image& image);
 /// The scale that DetailOptions asks for, or the one that suits the scheduler.
 float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler);
 
+/// Whether guidance evaluates both prompts at once for a grid of so many latent pixels: where that is faster,
+/// or as fast and takes little memory. By size alone: how much memory is free does not change the result.
+bool guides_in_one_batch(const UNetConfig& unet, int64_t latent_pixels);
+
 /// Noise of ancestral schedulers: a value depends on (seed, call, place) alone, so that a resumed run draws
 /// the same.
 std::vector<float> scheduler_noise(uint64_t seed, int call, size_t size);

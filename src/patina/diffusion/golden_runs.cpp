@@ -87,7 +87,7 @@ void check_run(const Stored& stored, Parts& parts, const SchedulePlan& plan, int
   if (has_start != 0 && has_start != 1) return comparison.fail("latents are not one a step");
   if (has_start) comparison.add("latents[0]", noisy, latents[0], kEndToEndLimit);
 
-  const Denoiser denoiser{&parts.unet(), controls, text, guidance_scale};
+  const Denoiser denoiser{&parts.unet(), controls, text, guidance_scale, /*one_batch=*/true};
   const SamplerCallbacks callbacks{
       [&](int index, size_t) { return floats(stored["step_noises"][index - start]); },
       [&](const SamplerState& state, const Guided& prediction) {

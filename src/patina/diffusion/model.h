@@ -23,6 +23,7 @@ struct Model::State {
   Held<Vae> vae;
   Held<ControlNet> controlnet_tile, controlnet_normal;
   SchedulerConfig scheduler;
+  std::string negative_prompt;  // where none is given
   LearnedWords words;
   std::vector<std::string> notes;  // what was chosen without being told to, for the description
 };

@@ -133,15 +133,18 @@ void check_task(const UNetPart& unet) {
                     " channels); expected a text-to-image model, whose U-Net takes 4");
 }
 
-/// model_index.json names the class of the whole model.
-void check_model_index(const fs::path& folder) {
+/// model_index.json names the class of the whole model; patina's own brings a negative prompt.
+void read_model_index(ModelParts& parts, const fs::path& folder) {
   const fs::path file = folder / "model_index.json";
   if (!fs::exists(file)) return;
+  parts.files.push_back(file);
   const json index = json::parse(read_text_file(file, 1 << 24), nullptr, /*allow_exceptions=*/false);
   if (!index.is_object()) throw Error(ErrorCode::kFormat, file.string(), "is not a JSON object");
-  const std::string name = index.contains("_class_name") && index["_class_name"].is_string()
-                               ? index["_class_name"].get<std::string>()
-                               : "";
+  const auto text = [&](const char* key) {
+    return index.contains(key) && index[key].is_string() ? index[key].get<std::string>() : "";
+  };
+  parts.negative_prompt = text("_negative_prompt");
+  const std::string name = text("_class_name");
   if (name.empty() || name.starts_with("StableDiffusionPipeline") ||
       name.starts_with("StableDiffusionImg2Img") || name.starts_with("StableDiffusionControlNet") ||
       name.starts_with("Patina"))
@@ -185,7 +188,7 @@ void find_prediction(ModelParts& parts, const ModelPaths& paths, const fs::path&
 }
 
 void open_diffusers_folder(ModelParts& parts, const ModelPaths& paths, const fs::path& model) {
-  check_model_index(model);
+  read_model_index(parts, model);
   const auto component = [&](const char* name) {
     const fs::path folder = model / name;
     if (!fs::is_directory(folder))

@@ -24,6 +24,7 @@ struct ModelParts {
   std::filesystem::path tokenizer;
   std::optional<int64_t> pad_id;  // of the tokenizer, where the family wants another than its files say
   SchedulerConfig scheduler;
+  std::string negative_prompt;  // model_index.json's _negative_prompt: what edits start from unless told otherwise
   bool ask_prediction = false;  // nothing tells what the U-Net predicts: it must be asked (prediction.h)
   LoraSet loras;
   std::vector<LearnedWord> words;

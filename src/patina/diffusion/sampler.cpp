@@ -20,23 +20,27 @@ std::span<const float> values_of(const at::Tensor& tensor) {
 }  // namespace
 
 Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
-  const int64_t batch = text.size(0);
-  PATINA_CHECK(batch == (guidance_scale == 1 ? 1 : 2));
-  const at::Tensor sample = latents.expand({batch, -1, -1, -1});
+  PATINA_CHECK(text.size(0) == (guidance_scale == 1 ? 1 : 2));
   const at::Tensor timesteps = at::full({1}, timestep, at::kFloat);
+  const std::vector<at::Tensor> texts = at::split(text, one_batch ? 2 : 1);
+  std::vector<at::Tensor> samples;
+  for (const at::Tensor& prompts : texts) samples.push_back(latents.expand({prompts.size(0), -1, -1, -1}));
 
-  ControlResiduals residuals;
+  // ControlNets outside: with little memory each is read from its file for this loop.
+  std::vector<ControlResiduals> residuals(texts.size());
   for (const Control& control : controls) {
     if (control.scale == 0) continue;
     const std::shared_ptr<const ControlNet> network = control.network->use();
-    residuals = sum(std::move(residuals), (*network)(sample, timesteps, text, control.hint, control.scale, {},
-                                                     bias_controls ? bias : nullptr));
+    for (size_t i = 0; i < texts.size(); ++i)
+      residuals[i] =
+          sum(std::move(residuals[i]), (*network)(samples[i], timesteps, texts[i], control.hint,
+                                                  control.scale, {}, bias_controls ? bias : nullptr));
   }
-  const at::Tensor out =
-      (*unet)({sample, timesteps, text, std::move(residuals), bias}, record)
-          .to(at::kFloat)
-          .contiguous();
-  if (batch == 1) return {out, out, out};
+  std::vector<at::Tensor> outputs;
+  for (size_t i = 0; i < texts.size(); ++i)
+    outputs.push_back((*unet)({samples[i], timesteps, texts[i], std::move(residuals[i]), bias}, record));
+  const at::Tensor out = at::cat(outputs).to(at::kFloat).contiguous();
+  if (guidance_scale == 1) return {out, out, out};
   const at::Tensor unconditional = out.slice(0, 0, 1), conditional = out.slice(0, 1, 2);
   return {unconditional, conditional, unconditional + guidance_scale * (conditional - unconditional)};
 }

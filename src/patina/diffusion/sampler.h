@@ -27,13 +27,13 @@ struct Guided {
   at::Tensor guided;
 };
 
-/// The network with everything fixed but latent and time. Classifier-free guidance [Ho2022] runs both prompts
-/// as one batch.
+/// The network with everything fixed but latent and time, with classifier-free guidance [Ho2022].
 struct Denoiser {
   const UNet* unet = nullptr;
   std::vector<Control> controls;
   at::Tensor text;  // [2,T,D], negative prompt first; [1,T,D] without guidance
   float guidance_scale = 1;
+  bool one_batch = true;  // both prompts of guidance in one evaluation, which takes twice the memory
   const nn::SelfAttentionBias* bias = nullptr;  // null: none
   bool bias_controls = false;                   // whether it acts on the ControlNets too
   nn::Recorder record = {};                     // listens to the U-Net

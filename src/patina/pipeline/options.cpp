@@ -44,14 +44,7 @@ std::vector<Option> make_options() {
        .help = "What the asset shall look like, e.g. \"a rusty old kettle\".",
        .stages = kDetailStage},
       [](Config & c) -> auto& { return c.detail.prompt; }));
-  add(text_option(
-      {.name = "negative-prompt",
-       .aliases = {"-n"},
-       .group = edit,
-       .placeholder = "TEXT",
-       .help = "What it shall not look like.",
-       .stages = kDetailStage},
-      [](Config & c) -> auto& { return c.detail.negative_prompt; }));
+  add(negative_prompt_option(edit));
   add(number_option<float>(
       {.name = "strength",
        .aliases = {},

@@ -150,6 +150,24 @@ Option materials_option() {
   return option;
 }
 
+Option negative_prompt_option(const std::string& group) {
+  Option option{
+      .name = "negative-prompt",
+      .aliases = {"-n"},
+      .group = group,
+      .placeholder = "auto|TEXT",
+      .help =
+          "What it shall not look like. auto is what the model names for itself (patina-mini \"a "
+          "clean new object\", so that a prompt acts by what it says beyond that), else nothing.",
+      .default_text = "auto",
+      .stages = kDetailStage};
+  option.set = [](Config& c, Values v) {
+    c.detail.negative_prompt = v.front() == "auto" ? std::nullopt : std::optional(v.front());
+  };
+  option.get = [](const Config& c) { return json(c.detail.negative_prompt.value_or("auto")); };
+  return option;
+}
+
 Option guidance_scale_option(const std::string& group) {
   Option option{
       .name = "guidance-scale",

@@ -13,6 +13,7 @@ Option resolution_option();
 Option preset_option();
 Option exposure_option();
 Option materials_option();
+Option negative_prompt_option(const std::string& group);
 Option guidance_scale_option(const std::string& group);
 Option texture_size_option();
 Option fit_option();

@@ -92,7 +92,7 @@ void write_attention(const ShownAttention& shown, const Config& config, const fs
   const diffusion::CapturedAttention& c = shown.captured;
   report::AttentionPage page;
   page.title = config.asset.filename().string();
-  page.prompt = config.detail.prompt, page.negative_prompt = config.detail.negative_prompt;
+  page.prompt = config.detail.prompt, page.negative_prompt = config.detail.negative_prompt.value_or("");
   page.figure = shown.figure;
   page.beta = c.beta;
   const bool additive = config.detail.bias_scaling == diffusion::BiasScaling::kAdditive;

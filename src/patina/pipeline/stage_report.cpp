@@ -133,7 +133,7 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
   report::ReportData page;
   page.title = bench.asset.path.filename().string();
   page.prompt = config.detail.prompt;
-  page.negative_prompt = config.detail.negative_prompt;
+  page.negative_prompt = config.detail.negative_prompt.value_or("");
   page.before = views.tile;
   page.edited.assign(edited.begin(), edited.end());
   page.after = read_numbered(run, "report/rendered", bench.cameras);
