@@ -185,22 +185,34 @@ TEST(Detail, guidance_says_the_same_in_one_batch_and_in_two) {
   EXPECT_GT((at_once.conditional - at_once.unconditional).abs().max().item<double>(), 1e-3);
 }
 
-TEST(Detail, a_models_own_negative_prompt_holds_where_none_is_given) {
+TEST(Detail, a_models_own_guidance_holds_where_none_is_given) {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "model";
   fs::copy(test::data_dir() / "tiny-sd", path, fs::copy_options::recursive);
   write_file(path / "model_index.json",
-             std::string(R"({"_class_name": "StableDiffusionPipeline", "_negative_prompt": "blurry"})"));
+             std::string(R"({"_class_name": "StableDiffusionPipeline", "_negative_prompt": "blurry",
+                             "_guidance_scale": 3})"));
   const Model with_own({path, {}, {}, {}}, {Dtype::kF32, 0});
   const DetailInputs inputs = made_inputs(1, 64);
-  const auto edited = [&](const Model& model, std::optional<std::string> negative_prompt) {
+  const auto edited = [&](const Model& model, std::optional<std::string> negative_prompt, float scale) {
     DetailOptions options = short_options();
+    options.guidance_scale = scale;
     options.negative_prompt = std::move(negative_prompt);
     return generate_detail(model, inputs, options, {}, {})[0].pixels;
   };
-  EXPECT_EQ(edited(with_own, std::nullopt), edited(tiny_model(), "blurry"));
-  EXPECT_EQ(edited(with_own, ""), edited(tiny_model(), std::nullopt));
-  EXPECT_EQ(edited(with_own, "a mossy stone"), edited(tiny_model(), "a mossy stone"));
+  constexpr float kAuto = kAutoGuidanceScale;
+  EXPECT_EQ(edited(with_own, std::nullopt, kAuto), edited(tiny_model(), "blurry", 3));
+  EXPECT_EQ(edited(with_own, "", 7.5f), edited(tiny_model(), std::nullopt, kAuto));
+  EXPECT_EQ(edited(with_own, "a mossy stone", kAuto), edited(tiny_model(), "a mossy stone", 3));
+
+  write_file(path / "model_index.json", std::string(R"({"_guidance_scale": 0})"));
+  try {
+    const Model refused({path, {}, {}, {}}, {Dtype::kF32, 0});
+    ADD_FAILURE() << "took a guidance scale of 0";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("_guidance_scale is 0, expected 1 to 50"), std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(Detail, what_the_vae_loses_of_the_renders_comes_back) {

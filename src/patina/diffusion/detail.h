@@ -91,8 +91,7 @@ struct DetailInputs {
                                         // condition; empty: tile_views
 };
 
-/// DetailOptions::guidance_scale: 3.5 for models that start from pure noise, whose colours nothing but the
-/// words decides and which guidance soon makes shrill; 7.5 for others.
+/// DetailOptions::guidance_scale: the model's own, 7.5 where it names none.
 inline constexpr float kAutoGuidanceScale = 0;
 
 struct DetailOptions {

@@ -133,9 +133,8 @@ at::Tensor tensor_from_image(const Image& image) {
   return pixels.permute({0, 3, 1, 2}).clone();
 }
 
-float guidance_scale_of(const DetailOptions& options, const SchedulerConfig& scheduler) {
-  if (options.guidance_scale != kAutoGuidanceScale) return options.guidance_scale;
-  return scheduler.zero_terminal_snr ? 3.5f : 7.5f;
+float guidance_scale_of(const DetailOptions& options, const GuidanceDefaults& defaults) {
+  return options.guidance_scale == kAutoGuidanceScale ? defaults.scale : options.guidance_scale;
 }
 
 bool guides_in_one_batch(const UNetConfig& unet, int64_t latent_pixels) {
@@ -170,9 +169,9 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
   // What stays the same over all steps.
   run->bias = {inputs.bias_levels, options.bias_weight, options.bias_scaling == BiasScaling::kPaper};
   std::vector<std::string> prompts{options.prompt};
-  const float guidance_scale = guidance_scale_of(options, run->plan.config);
+  const float guidance_scale = guidance_scale_of(options, networks.guidance);
   if (guidance_scale != 1)
-    prompts.insert(prompts.begin(), options.negative_prompt.value_or(networks.negative_prompt));
+    prompts.insert(prompts.begin(), options.negative_prompt.value_or(networks.guidance.negative_prompt));
   const at::Tensor text = encode_prompts(networks.tokenizer, *networks.text_encoder.use(), networks.words,
                                          prompts, options.clip_skip);
   run->denoiser = {

@@ -92,7 +92,7 @@ Model::Model(const ModelPaths& paths, const ModelOptions& options) {
       load_network<UNet>(parts.unet, type, &parts.loras.unet), hold_network<Vae>(parts.vae, type, resident),
       hold_network<ControlNet>(parts.controlnet_tile, type, resident),
       hold_network<ControlNet>(parts.controlnet_normal, type, resident), parts.scheduler,
-      parts.negative_prompt, load_words(parts.words, parts.text_encoder.config, type), parts.notes});
+      parts.guidance, load_words(parts.words, parts.text_encoder.config, type), parts.notes});
   check_fit(*state_);
   if (parts.ask_prediction) {
     state_->scheduler.prediction = ask_prediction(state_->unet, state_->scheduler);

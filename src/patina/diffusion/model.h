@@ -7,6 +7,7 @@
 #include "patina/diffusion/controlnet.h"
 #include "patina/diffusion/detail.h"
 #include "patina/diffusion/held.h"
+#include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/schedulers.h"
 #include "patina/diffusion/text_conditioning.h"
 #include "patina/diffusion/tokenizer.h"
@@ -23,7 +24,7 @@ struct Model::State {
   Held<Vae> vae;
   Held<ControlNet> controlnet_tile, controlnet_normal;
   SchedulerConfig scheduler;
-  std::string negative_prompt;  // where none is given
+  GuidanceDefaults guidance;
   LearnedWords words;
   std::vector<std::string> notes;  // what was chosen without being told to, for the description
 };

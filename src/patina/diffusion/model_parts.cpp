@@ -143,7 +143,13 @@ void read_model_index(ModelParts& parts, const fs::path& folder) {
   const auto text = [&](const char* key) {
     return index.contains(key) && index[key].is_string() ? index[key].get<std::string>() : "";
   };
-  parts.negative_prompt = text("_negative_prompt");
+  parts.guidance.negative_prompt = text("_negative_prompt");
+  if (const json scale = index.value("_guidance_scale", json()); scale.is_number()) {
+    parts.guidance.scale = scale.get<float>();
+    if (!(parts.guidance.scale >= 1 && parts.guidance.scale <= 50))
+      throw Error(ErrorCode::kFormat, file.string(),
+                  "_guidance_scale is " + scale.dump() + ", expected 1 to 50");
+  }
   const std::string name = text("_class_name");
   if (name.empty() || name.starts_with("StableDiffusionPipeline") ||
       name.starts_with("StableDiffusionImg2Img") || name.starts_with("StableDiffusionControlNet") ||

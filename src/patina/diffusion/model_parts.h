@@ -15,6 +15,13 @@
 
 namespace patina::diffusion {
 
+/// What guidance is where the user names nothing else: `_guidance_scale` and `_negative_prompt` of
+/// model_index.json, which other programs pass over.
+struct GuidanceDefaults {
+  float scale = 7.5f;
+  std::string negative_prompt;
+};
+
 struct ModelParts {
   Family family = Family::kSd1;
   UNetPart unet;
@@ -24,7 +31,7 @@ struct ModelParts {
   std::filesystem::path tokenizer;
   std::optional<int64_t> pad_id;  // of the tokenizer, where the family wants another than its files say
   SchedulerConfig scheduler;
-  std::string negative_prompt;  // model_index.json's _negative_prompt: what edits start from unless told otherwise
+  GuidanceDefaults guidance;
   bool ask_prediction = false;  // nothing tells what the U-Net predicts: it must be asked (prediction.h)
   LoraSet loras;
   std::vector<LearnedWord> words;

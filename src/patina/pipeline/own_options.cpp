@@ -151,16 +151,15 @@ Option materials_option() {
 }
 
 Option negative_prompt_option(const std::string& group) {
-  Option option{
-      .name = "negative-prompt",
-      .aliases = {"-n"},
-      .group = group,
-      .placeholder = "auto|TEXT",
-      .help =
-          "What it shall not look like. auto is what the model names for itself (patina-mini \"a "
-          "clean new object\", so that a prompt acts by what it says beyond that), else nothing.",
-      .default_text = "auto",
-      .stages = kDetailStage};
+  Option option{.name = "negative-prompt",
+                .aliases = {"-n"},
+                .group = group,
+                .placeholder = "auto|TEXT",
+                .help =
+                    "What it shall not look like. auto is what the model names for itself (patina-mini \"a "
+                    "clean new object\", so that a prompt acts by what it says beyond that), else nothing.",
+                .default_text = "auto",
+                .stages = kDetailStage};
   option.set = [](Config& c, Values v) {
     c.detail.negative_prompt = v.front() == "auto" ? std::nullopt : std::optional(v.front());
   };
@@ -175,9 +174,8 @@ Option guidance_scale_option(const std::string& group) {
       .group = group,
       .placeholder = "auto|G",
       .help =
-          "How strongly the prompt acts (classifier-free guidance), 1 to 50; 1 switches guidance off "
-          "and halves the time. auto is 3.5 for models that start from pure noise (patina-mini "
-          "does), 7.5 for others.",
+          "How strongly the prompt acts (classifier-free guidance), 1 to 50; 1 switches guidance off and "
+          "halves the time. auto is what the model names for itself (patina-mini 2), else 7.5.",
       .default_text = "auto",
       .stages = kDetailStage};
   const Option named = option;
