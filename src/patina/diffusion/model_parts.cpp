@@ -133,7 +133,7 @@ void check_task(const UNetPart& unet) {
                     " channels); expected a text-to-image model, whose U-Net takes 4");
 }
 
-/// model_index.json names the class of the whole model; patina's own brings a negative prompt.
+/// model_index.json names the class of the whole model, and may say how it is to be guided.
 void read_model_index(ModelParts& parts, const fs::path& folder) {
   const fs::path file = folder / "model_index.json";
   if (!fs::exists(file)) return;
