@@ -37,9 +37,9 @@ class ModelFolder : public testing::Test {
   }
   fs::path model() const { return folder_.path() / "model"; }
 
-  std::string message() const {
+  std::string message(const ModelOptions& options = {}) const {
     try {
-      Model loaded({model(), {}, {}, {}}, {});
+      Model loaded({model(), {}, {}, {}}, options);
     } catch (const Error& error) {
       return error.what();
     }
@@ -76,6 +76,14 @@ TEST_F(ModelFolder, loads_and_describes_itself) {
   EXPECT_EQ(model_.latent_channels(), 4);
   EXPECT_EQ(model_.dtype(), Dtype::kF32);  // small networks are not worth bf16
   EXPECT_NE(model_.description().find("U-Net 2.8 M"), std::string::npos) << model_.description();
+}
+
+TEST_F(ModelFolder, devices_that_are_not_there_are_refused) {
+  const Model on_processor({model(), {}, {}, {}}, {.device = Device::kCpu});
+  EXPECT_EQ(on_processor.device(), Device::kCpu);
+  EXPECT_NE(message({.dtype = Dtype::kF16, .device = Device::kCpu}).find("--dtype f16"), std::string::npos);
+  if (Model({model(), {}, {}, {}}, {}).device() == Device::kCuda) GTEST_SKIP() << "there is a GPU here";
+  EXPECT_NE(message({.device = Device::kCuda}).find("no CUDA device here"), std::string::npos);
 }
 
 TEST_F(ModelFolder, missing_tensors_are_named_with_their_shapes) {

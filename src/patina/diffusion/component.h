@@ -32,12 +32,12 @@ class TableWeights final : public nn::WeightSource {
 /// Whether shapes differ by trailing ones alone: 1×1 convolutions and linear layers.
 bool same_but_ones(at::IntArrayRef a, at::IntArrayRef b);
 
-/// A network of these weights, as `type`. Throws Error that names every tensor that does not fit.
+/// A network of these weights. Throws Error that names every tensor that does not fit.
 template <class Network, class Config>
-Network load_network(const NetworkPart<Config>& part, at::ScalarType type,
+Network load_network(const NetworkPart<Config>& part, nn::Placement placement,
                      const LoraDeltas* deltas = nullptr) {
   TableWeights source(part.table, deltas);
-  nn::WeightReader weights(source, type);
+  nn::WeightReader weights(source, placement);
   Network network(part.config, weights);
   weights.finish();
   return network;
@@ -48,15 +48,15 @@ void release_pages(const TensorTable& table);
 
 /// Loads the network for good, or only checks it and reads it whenever it is used. Throws as load_network.
 template <class Network, class Config>
-Held<Network> hold_network(const NetworkPart<Config>& part, at::ScalarType type, bool resident,
+Held<Network> hold_network(const NetworkPart<Config>& part, nn::Placement placement, bool resident,
                            const LoraDeltas& deltas = {}) {
-  if (resident) return Held<Network>(load_network<Network>(part, type, &deltas));
-  const auto read = [part, type, deltas] {
+  if (resident) return Held<Network>(load_network<Network>(part, placement, &deltas));
+  const auto read = [part, placement, deltas] {
     const auto release = [table = part.table](const Network* network) {
       delete network;
       release_pages(table);
     };
-    return std::shared_ptr<const Network>(new Network(load_network<Network>(part, type, &deltas)), release);
+    return std::shared_ptr<const Network>(new Network(load_network<Network>(part, placement, &deltas)), release);
   };
   return Held<Network>(part.config, check_tensors<Network>(part), read);
 }

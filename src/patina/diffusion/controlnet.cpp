@@ -56,7 +56,8 @@ at::Tensor ControlNet::hint(const at::Tensor& condition, const nn::Recorder& rec
   PATINA_CHECK_EQ(condition.dim(), 4);
   PATINA_CHECK_EQ(condition.size(1), config_.conditioning_channels);
   const at::Tensor ordered = config_.bgr ? condition.flip({1}) : condition;
-  return condition_embedding_(ordered.to(type_).contiguous(at::MemoryFormat::ChannelsLast), record);
+  return condition_embedding_(
+      ordered.to(encoder_.conv_in.weight.device(), type_).contiguous(at::MemoryFormat::ChannelsLast), record);
 }
 
 ControlResiduals ControlNet::operator()(const at::Tensor& sample, const at::Tensor& timesteps,
@@ -64,8 +65,9 @@ ControlResiduals ControlNet::operator()(const at::Tensor& sample, const at::Tens
                                         const nn::Recorder& record, const nn::SelfAttentionBias* bias) const {
   PATINA_CHECK_EQ(sample.dim(), 4);
   PATINA_CHECK_EQ(sample.size(1), config_.unet.in_channels);
-  const at::Tensor x = sample.to(type_).contiguous(at::MemoryFormat::ChannelsLast);
-  const Conditions conditions{encoder_.time(timesteps, record), text.to(type_), bias, record};
+  const c10::Device device = encoder_.conv_in.weight.device();
+  const at::Tensor x = sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
+  const Conditions conditions{encoder_.time(timesteps, record), text.to(device, type_), bias, record};
   auto [skips, mid] = encoder_(encoder_.conv_in(x, record) + hint, conditions);
 
   ControlResiduals residuals;

@@ -36,7 +36,8 @@ std::vector<Image> decode_views(const Vae& vae, std::vector<float>& latents, con
     for (int64_t column = 0; column < sizes.grid; ++column) {
       progress.throw_if_stopped();
       at::Tensor view = 0.5 * vae.decode(grid.slice(2, row * height, (row + 1) * height)
-                                             .slice(3, column * width, (column + 1) * width)) +
+                                             .slice(3, column * width, (column + 1) * width))
+                                  .cpu() +
                         0.5;
       if (share > 0) view = view + share * fine_detail(vae, tensor_from_image(renders[views.size()]), view);
       views.push_back(image_from_tensor(at::clamp(view, 0, 1)));

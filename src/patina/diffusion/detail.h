@@ -19,7 +19,8 @@
 namespace patina::diffusion {
 
 enum class Scheduler { kDdim, kPndm, kEuler, kEulerAncestral, kDpmSolverPp2m, kDpmSolverPp2mKarras, kUniPc };
-enum class Dtype { kAuto, kF32, kBf16 };
+enum class Dtype { kAuto, kF32, kBf16, kF16 };  // kF16: on CUDA alone
+enum class Device { kAuto, kCpu, kCuda };
 enum class BiasScaling { kPaper, kAdditive };  // β = w/√d or β = w
 
 enum class PredictionChoice { kAuto, kEpsilon, kV };  // what the U-Net was trained to tell
@@ -49,6 +50,7 @@ struct ModelOptions {
   Dtype dtype = Dtype::kAuto;
   int num_threads = 0;      // 0: all processors
   bool low_memory = false;  // all networks but the U-Net are read anew for each use
+  Device device = Device::kAuto;  // kAuto: CUDA where patina was built with it and finds a GPU
 };
 
 /// Looks at the folders and weight files of a model without loading it. Throws Error that names what is
@@ -62,7 +64,7 @@ std::vector<std::filesystem::path> model_files(const ModelPaths& paths);
 class Model {
  public:
   /// Throws Error that names the file and tensor: missing, wrongly shaped (expected and found), malformed, a
-  /// pickle.
+  /// pickle. Throws Error{kDevice} where there is no such device.
   Model(const ModelPaths& paths, const ModelOptions& options);
   ~Model();
   Model(Model&&) noexcept;
@@ -71,6 +73,7 @@ class Model {
   int latent_scale() const;  // image pixels a latent pixel, from the VAE's config
   int latent_channels() const;
   Dtype dtype() const;              // what kAuto became
+  Device device() const;            // likewise
   std::string description() const;  // family, parameters, precision: one line for logs and config.json
 
   struct State;

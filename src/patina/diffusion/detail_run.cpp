@@ -118,7 +118,7 @@ std::vector<float> start_latents(const Vae& vae, const std::vector<Image>& views
   std::vector<at::Tensor> latents;
   for (const Image& view : views) {
     progress.throw_if_stopped();
-    latents.push_back(vae.encode(2 * tensor_from_image(view) - 1).mean * vae.config().scaling_factor);
+    latents.push_back(vae.encode(2 * tensor_from_image(view) - 1).mean.cpu() * vae.config().scaling_factor);
     progress.update("encode", static_cast<double>(latents.size()), static_cast<double>(views.size()));
   }
   const at::Tensor tiled = tile(latents, grid).contiguous();

@@ -20,7 +20,7 @@ at::Tensor largest_around(const at::Tensor& map) {
 
 at::Tensor fine_detail(const Vae& vae, const at::Tensor& render, const at::Tensor& edited) {
   constexpr float kColourChange = 0.25f;  // of which 1/e of the colour comes back
-  const at::Tensor kept = 0.5 * vae.decode(vae.encode(2 * render - 1).mean) + 0.5;
+  const at::Tensor kept = 0.5 * vae.decode(vae.encode(2 * render - 1).mean).cpu() + 0.5;
   const at::Tensor lost = render - kept, light = luma(lost), change = edited - kept;
   const at::Tensor colour_change = (change - luma(change)).square().sum(1, /*keepdim=*/true);
   const at::Tensor share = at::exp(-largest_around(colour_change) / (kColourChange * kColourChange));

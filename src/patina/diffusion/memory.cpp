@@ -25,7 +25,7 @@ constexpr int64_t kLibraryBytes = 350'000'000;
 DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
                             const DetailOptions& options) {
   const Model::State& networks = model.state();
-  const int64_t bytes = networks.dtype == Dtype::kBf16 ? 2 : 4;
+  const int64_t bytes = networks.dtype == Dtype::kF32 ? 4 : 2;
   const int64_t text = networks.text_encoder.num_parameters() * bytes,
                 vae = networks.vae.num_parameters() * bytes,
                 tile = networks.controlnet_tile.num_parameters() * bytes,

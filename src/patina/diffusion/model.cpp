@@ -21,13 +21,31 @@ namespace {
 /// four times as fast.
 constexpr uintmax_t kLargeWeightBytes = 400'000'000;
 
+Device resolve(Device wanted) {
+  if (wanted == Device::kCuda && !at::hasCUDA())
+    throw Error(ErrorCode::kDevice, "--device cuda",
+                "there is no CUDA device here, or this patina was built without CUDA (docs/models.md)");
+  return wanted == Device::kAuto ? (at::hasCUDA() ? Device::kCuda : Device::kCpu) : wanted;
+}
+
 /// bf16 pays where the processor multiplies it natively and the networks are large enough to be bound by
-/// arithmetic.
-Dtype resolve(Dtype wanted, const TensorTable& unet) {
+/// arithmetic; on CUDA always, and the biased attention needs 16 bits there.
+Dtype resolve(Dtype wanted, Device device, const TensorTable& unet) {
+  if (wanted == Dtype::kF16 && device == Device::kCpu)
+    throw Error(ErrorCode::kUsage, "--dtype f16", "is for --device cuda; on a processor take bf16 or f32");
   if (wanted != Dtype::kAuto) return wanted;
+  if (device == Device::kCuda) return Dtype::kBf16;
   uintmax_t bytes = 0;
   for (const auto& [name, tensor] : unet.tensors) bytes += tensor.entry.bytes.size();
   return __builtin_cpu_supports("avx512bf16") && bytes >= kLargeWeightBytes ? Dtype::kBf16 : Dtype::kF32;
+}
+
+at::ScalarType scalar_type(Dtype dtype) {
+  return dtype == Dtype::kBf16 ? at::kBFloat16 : dtype == Dtype::kF16 ? at::kHalf : at::kFloat;
+}
+
+const char* name_of(Dtype dtype) {
+  return dtype == Dtype::kBf16 ? "bf16" : dtype == Dtype::kF16 ? "f16" : "f32";
 }
 
 /// The networks must fit each other: what one gives is what the next takes.
@@ -83,16 +101,18 @@ Model::Model(const ModelPaths& paths, const ModelOptions& options) {
 
   const c10::InferenceMode inference;
   const ModelParts parts = find_model_parts(paths);
-  const Dtype dtype = resolve(options.dtype, parts.unet.table);
-  const at::ScalarType type = dtype == Dtype::kBf16 ? at::kBFloat16 : at::kFloat;
+  const Device device = resolve(options.device);
+  const Dtype dtype = resolve(options.dtype, device, parts.unet.table);
+  const nn::Placement placement{scalar_type(dtype), device == Device::kCuda ? c10::kCUDA : c10::kCPU};
   const bool resident = !options.low_memory;
-  state_ = std::unique_ptr<State>(new State{
-      dtype, Tokenizer(parts.tokenizer, parts.pad_id),
-      hold_network<TextEncoder>(parts.text_encoder, type, resident, parts.loras.text_encoder),
-      load_network<UNet>(parts.unet, type, &parts.loras.unet), hold_network<Vae>(parts.vae, type, resident),
-      hold_network<ControlNet>(parts.controlnet_tile, type, resident),
-      hold_network<ControlNet>(parts.controlnet_normal, type, resident), parts.scheduler,
-      parts.guidance, load_words(parts.words, parts.text_encoder.config, type), parts.notes});
+  state_ = std::unique_ptr<State>(
+      new State{dtype, device, Tokenizer(parts.tokenizer, parts.pad_id),
+                hold_network<TextEncoder>(parts.text_encoder, placement, resident, parts.loras.text_encoder),
+                load_network<UNet>(parts.unet, placement, &parts.loras.unet),
+                hold_network<Vae>(parts.vae, placement, resident),
+                hold_network<ControlNet>(parts.controlnet_tile, placement, resident),
+                hold_network<ControlNet>(parts.controlnet_normal, placement, resident), parts.scheduler,
+                parts.guidance, load_words(parts.words, parts.text_encoder.config, placement), parts.notes});
   check_fit(*state_);
   if (parts.ask_prediction) {
     state_->scheduler.prediction = ask_prediction(state_->unet, state_->scheduler);
@@ -115,6 +135,9 @@ int Model::latent_channels() const {
 Dtype Model::dtype() const {
   return state_->dtype;
 }
+Device Model::device() const {
+  return state_->device;
+}
 
 std::string Model::description() const {
   const State& s = *state_;
@@ -128,8 +151,8 @@ std::string Model::description() const {
   return std::string(name_of(family_of(s.unet.config()))) + " architecture, U-Net " +
          millions(s.unet.num_parameters()) + ", ControlNets 2 × " +
          millions(s.controlnet_tile.num_parameters()) + ", VAE " + millions(s.vae.num_parameters()) +
-         ", text encoder " + millions(s.text_encoder.num_parameters()) + " parameters, " +
-         (s.dtype == Dtype::kBf16 ? "bf16" : "f32") + notes;
+         ", text encoder " + millions(s.text_encoder.num_parameters()) + " parameters, " + name_of(s.dtype) +
+         (s.device == Device::kCuda ? " on CUDA" : "") + notes;
 }
 
 }  // namespace patina::diffusion

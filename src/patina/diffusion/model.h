@@ -18,6 +18,7 @@ namespace patina::diffusion {
 
 struct Model::State {
   Dtype dtype = Dtype::kF32;
+  Device device = Device::kCpu;
   Tokenizer tokenizer;
   Held<TextEncoder> text_encoder;
   UNet unet;

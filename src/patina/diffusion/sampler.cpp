@@ -39,7 +39,7 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
   std::vector<at::Tensor> outputs;
   for (size_t i = 0; i < texts.size(); ++i)
     outputs.push_back((*unet)({samples[i], timesteps, texts[i], std::move(residuals[i]), bias}, record));
-  const at::Tensor out = at::cat(outputs).to(at::kFloat).contiguous();
+  const at::Tensor out = at::cat(outputs).to(at::kCPU, at::kFloat).contiguous();
   if (guidance_scale == 1) return {out, out, out};
   const at::Tensor unconditional = out.slice(0, 0, 1), conditional = out.slice(0, 1, 2);
   return {unconditional, conditional, unconditional + guidance_scale * (conditional - unconditional)};

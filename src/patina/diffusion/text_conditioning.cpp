@@ -17,7 +17,8 @@ at::Tensor encode_chunk(const TokenChunk& chunk, const TextEncoder& text_encoder
   const at::Tensor encoding = text_encoder(ids, clip_skip, {}, words.vectors).last_hidden_state;
   if (!chunk.is_weighted()) return encoding;
   const at::Tensor plain = encoding.to(at::kFloat);
-  const at::Tensor weighted = plain * at::tensor(chunk.weights, at::kFloat).view({1, -1, 1});
+  const at::Tensor weighted =
+      plain * at::tensor(chunk.weights, at::kFloat).to(plain.device()).view({1, -1, 1});
   const double mean = plain.mean().item<double>(), weighted_mean = weighted.mean().item<double>();
   // Weights of 0 throughout leave nothing to bring back.
   const double restore = weighted_mean != 0 ? mean / weighted_mean : 1.0;
@@ -27,7 +28,7 @@ at::Tensor encode_chunk(const TokenChunk& chunk, const TextEncoder& text_encoder
 }  // namespace
 
 LearnedWords load_words(std::span<const LearnedWord> words, const TextEncoderConfig& config,
-                        at::ScalarType type) {
+                        nn::Placement placement) {
   LearnedWords loaded;
   std::vector<at::Tensor> vectors;
   int64_t next = config.vocab_size;
@@ -36,7 +37,8 @@ LearnedWords load_words(std::span<const LearnedWord> words, const TextEncoderCon
                                    [&](const WordIds& other) { return other.word == word.word; });
     if (known) continue;
     loaded.words.push_back({word.word, next, word.count});
-    vectors.push_back(nn::read_tensor(*word.vectors.file, word.vectors.entry, type)
+    vectors.push_back(nn::read_tensor(*word.vectors.file, word.vectors.entry, placement.type)
+                          .to(placement.device)
                           .reshape({word.count, config.hidden_size}));
     next += word.count;
   }

@@ -15,11 +15,11 @@ namespace patina::diffusion {
 /// Learned words as the text encoder takes them.
 struct LearnedWords {
   std::vector<WordIds> words;
-  at::Tensor vectors;  // [n,D] in the encoder's type; undefined if there are none
+  at::Tensor vectors;  // [n,D] of the encoder's type, on its device; undefined if there are none
 };
 /// Ids count on from the vocabulary's end. Of two words of one name the first counts.
 LearnedWords load_words(std::span<const LearnedWord> words, const TextEncoderConfig& config,
-                        at::ScalarType type);
+                        nn::Placement placement);
 
 /// All prompts with as many chunks as the longest has: [prompts, chunks · positions, D]. Weighted vectors are
 /// brought back to the mean that the chunk had without weights, as A1111 does. Throws Error{kUsage}.

@@ -78,8 +78,8 @@ UpBlock load_up_block(nn::WeightReader& weights, size_t index, const UNetConfig&
 at::Tensor timestep_embedding(const at::Tensor& timesteps, int64_t width, bool flip_sin_to_cos,
                               double freq_shift) {
   const int64_t half = width / 2;
-  const at::Tensor exponents =
-      -std::log(10000.0) * at::arange(half, timesteps.options().dtype(at::kFloat)) / (static_cast<double>(half) - freq_shift);
+  const at::Tensor exponents = -std::log(10000.0) * at::arange(half, timesteps.options().dtype(at::kFloat)) /
+                               (static_cast<double>(half) - freq_shift);
   const at::Tensor angles = timesteps.to(at::kFloat).unsqueeze(1) * at::exp(exponents).unsqueeze(0);
   const at::Tensor sines = at::sin(angles), cosines = at::cos(angles);
   const at::Tensor embedding = flip_sin_to_cos ? at::cat({cosines, sines}, 1) : at::cat({sines, cosines}, 1);
@@ -115,8 +115,9 @@ Encoder load_encoder(nn::WeightReader& weights, const UNetConfig& config) {
 }
 
 at::Tensor Encoder::time(const at::Tensor& timesteps, const nn::Recorder& record) const {
-  const at::Tensor sinusoids = timestep_embedding(timesteps, config.levels.front().channels,
-                                                  config.flip_sin_to_cos, config.freq_shift);
+  const at::Tensor sinusoids =
+      timestep_embedding(timesteps.to(conv_in.weight.device()), config.levels.front().channels,
+                         config.flip_sin_to_cos, config.freq_shift);
   const at::Tensor projected = record("time_proj", sinusoids).to(conv_in.weight.scalar_type());
   const at::Tensor hidden = nn::silu(time_embedding.linear_1(projected, record));
   return nn::silu(record("time_embedding", time_embedding.linear_2(hidden, record)));
@@ -164,10 +165,11 @@ at::Tensor UNet::operator()(UNetInputs inputs, const nn::Recorder& record) const
   PATINA_CHECK_EQ(inputs.text.dim(), 3);
 
   // Down, keeping every layer's output; ControlNets add to what was kept.
-  at::Tensor sample = inputs.sample.to(type_).contiguous(at::MemoryFormat::ChannelsLast);
+  const c10::Device device = encoder_.conv_in.weight.device();
+  at::Tensor sample = inputs.sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
   if (config.center_input_sample) sample = 2 * sample - 1;
-  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.to(type_), inputs.bias,
-                              record};
+  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.to(device, type_),
+                              inputs.bias, record};
   auto [skips, h] = encoder_(encoder_.conv_in(sample, record), conditions);
   ControlResiduals& control = inputs.control;
   if (control.mid.defined()) {

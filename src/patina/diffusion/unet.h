@@ -82,8 +82,8 @@ class UNet {
   /// Reads <folder>/config.json and the weights beside it, as `type` (f32 or bf16). Throws Error.
   UNet(const std::filesystem::path& folder, at::ScalarType type);
 
-  /// The predicted noise (or what the scheduler's prediction type says), [B,C,H,W] in the type of the
-  /// weights.
+  /// The predicted noise (or what the scheduler's prediction type says), [B,C,H,W], of the weights' type and on
+  /// their device, to which inputs go.
   /// Takes the inputs by value, since it lets go of each residual that is used up: move them in where memory counts.
   at::Tensor operator()(UNetInputs inputs, const nn::Recorder& record = {}) const;
 

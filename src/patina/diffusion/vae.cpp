@@ -137,7 +137,8 @@ Vae::Vae(const std::filesystem::path& folder, at::ScalarType type)
 Posterior Vae::encode(const at::Tensor& image, const nn::Recorder& record) const {
   PATINA_CHECK_EQ(image.dim(), 4);
   PATINA_CHECK(image.size(2) % config_.latent_scale() == 0 && image.size(3) % config_.latent_scale() == 0);
-  at::Tensor h = encoder_.conv_in(image.to(type_).contiguous(at::MemoryFormat::ChannelsLast), record);
+  at::Tensor h = encoder_.conv_in(
+      image.to(encoder_.conv_in.weight.device(), type_).contiguous(at::MemoryFormat::ChannelsLast), record);
   for (const VaeBlock& block : encoder_.down_blocks) h = block(h, record);
   h = encoder_.mid_block(h, record);
   at::Tensor moments = encoder_.conv_out(encoder_.conv_norm_out.with_silu(h, record), record);
@@ -149,7 +150,8 @@ Posterior Vae::encode(const at::Tensor& image, const nn::Recorder& record) const
 at::Tensor Vae::decode(const at::Tensor& latents, const nn::Recorder& record) const {
   PATINA_CHECK_EQ(latents.dim(), 4);
   PATINA_CHECK_EQ(latents.size(1), config_.latent_channels);
-  at::Tensor h = latents.to(type_).contiguous(at::MemoryFormat::ChannelsLast);
+  at::Tensor h =
+      latents.to(decoder_.conv_in.weight.device(), type_).contiguous(at::MemoryFormat::ChannelsLast);
   if (post_quant_conv_) h = (*post_quant_conv_)(h, record);
   h = decoder_.mid_block(decoder_.conv_in(h, record), record);
   for (const VaeBlock& block : decoder_.up_blocks) h = block(h, record);

@@ -97,7 +97,7 @@ at::Tensor WeightReader::take(const std::string& name, std::vector<int64_t> shap
     return at::zeros(shape, type);
   }
   num_parameters_ += tensor.numel();
-  return tensor;
+  return placement_.device.is_cpu() ? tensor : tensor.to(placement_.device);
 }
 
 void WeightReader::finish() const {

@@ -47,21 +47,30 @@ class FileWeights final : public WeightSource {
   const SafeTensors& file_;
 };
 
+/// What tensors become, and where.
+struct Placement {
+  at::ScalarType type;
+  c10::Device device;
+
+  Placement(at::ScalarType t, c10::Device d = c10::kCPU) : type(t), device(d) {}
+};
+
 /// Hands out the tensors of one network and keeps account of what does not fit.
 ///
 /// take() never fails at once: what is missing or wrongly shaped is noted and zeros are returned, so that
 /// finish() can name all of it in one message.
 class WeightReader {
  public:
-  /// Tensors become `type`. `source` must outlive the reader, not the tensors.
-  WeightReader(WeightSource& source, at::ScalarType type) : source_(source), type_(type) {}
+  /// Tensors become of this type and go to this device; with the processor as device they stay where the source
+  /// gives them. `source` must outlive the reader, not the tensors.
+  WeightReader(WeightSource& source, Placement placement) : source_(source), placement_(placement) {}
 
   at::Tensor take(const std::string& name, std::vector<int64_t> shape) {
-    return take(name, std::move(shape), type_);
+    return take(name, std::move(shape), placement_.type);
   }
   at::Tensor take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type);
   bool has(const std::string& name) const { return source_.has(name); }
-  at::ScalarType type() const { return type_; }
+  at::ScalarType type() const { return placement_.type; }
   int64_t num_parameters() const { return num_parameters_; }
 
   /// Names that begin so may be in the file unused (position ids, training leftovers).
@@ -72,7 +81,7 @@ class WeightReader {
 
  private:
   WeightSource& source_;
-  at::ScalarType type_;
+  Placement placement_;
   int64_t num_parameters_ = 0;
   std::vector<std::string> taken_, ignored_, missing_, misshapen_;
 };

@@ -40,6 +40,7 @@ struct Config {
   // What the diffusion model does.
   diffusion::ModelPaths model;
   diffusion::Dtype dtype = diffusion::Dtype::kAuto;
+  diffusion::Device device = diffusion::Device::kAuto;
   bool low_memory = false;
   diffusion::DetailOptions detail{.bias_weight =
                                       1.2f};  // the paper's 1.2 to 1.8, its careful end [Hadadan2025, Fig. 5]

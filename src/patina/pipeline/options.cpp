@@ -14,6 +14,7 @@ namespace {
 
 using correspond::NoiseMode;
 using diffusion::BiasScaling;
+using diffusion::Device;
 using diffusion::Dtype;
 using diffusion::PredictionChoice;
 using diffusion::Scheduler;
@@ -214,10 +215,20 @@ std::vector<Option> make_options() {
        .aliases = {},
        .group = model,
        .placeholder = "",
-       .help = "Arithmetic of the networks; auto takes bf16 where it is faster here.",
+       .help =
+           "Arithmetic of the networks; auto takes bf16 where it is faster here. f16 is for --device cuda.",
        .stages = kDetailStage},
-      {{"auto", Dtype::kAuto}, {"f32", Dtype::kF32}, {"bf16", Dtype::kBf16}},
+      {{"auto", Dtype::kAuto}, {"f32", Dtype::kF32}, {"bf16", Dtype::kBf16}, {"f16", Dtype::kF16}},
       [](Config & c) -> auto& { return c.dtype; }));
+  add(choice_option<Device>(
+      {.name = "device",
+       .aliases = {},
+       .group = model,
+       .placeholder = "",
+       .help = "Where the networks run; auto takes a GPU if this patina was built with CUDA and finds one.",
+       .stages = kDetailStage},
+      {{"auto", Device::kAuto}, {"cpu", Device::kCpu}, {"cuda", Device::kCuda}},
+      [](Config & c) -> auto& { return c.device; }));
   add(flag_option(
       {.name = "low-memory",
        .aliases = {},

@@ -38,7 +38,8 @@ ShownAttention show_attention(const Config& config, const AttentionOptions& opti
                 "expected other than 0: attention is shown without and with the bias");
   check_inputs(config);
   const Workbench bench = open_workbench(config, progress);
-  const diffusion::Model model(config.model, {config.dtype, config.num_threads, config.low_memory});
+  const diffusion::Model model(config.model,
+                               {config.dtype, config.num_threads, config.low_memory, config.device});
   const render::Camera& camera = bench.cameras[0];
   const int grid = views::grid_of(bench.cameras.size());
   const AttentionLayer layer = diffusion::find_layer(

@@ -130,8 +130,8 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     std::optional<diffusion::Model>& model = shared_model ? *shared_model : own_model;
     const bool loads = !model;  // else its weights are among the bytes before
     if (loads)
-      model.emplace(config.model,
-                    diffusion::ModelOptions{config.dtype, config.num_threads, config.low_memory});
+      model.emplace(config.model, diffusion::ModelOptions{config.dtype, config.num_threads, config.low_memory,
+                                                          config.device});
     const double load_seconds = seconds_since(start);
     const PreparedDetail prepared = prepare_detail(bench, views, config, *model, progress);
 
@@ -139,7 +139,7 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     options.seed = config.seed;
     const diffusion::DetailMemory memory = diffusion::predict_memory(
         *model, views.set.grid, bench.cameras[0].width, bench.cameras[0].height, options);
-    warn_of_memory(memory, config, progress);
+    if (model->device() == diffusion::Device::kCpu) warn_of_memory(memory, config, progress);
     diffusion::DetailHooks hooks;
     hooks.on_checkpoint = [&](const diffusion::Checkpoint& c) {
       run.save_checkpoint("detail", key, c.next_step, c.bytes);
