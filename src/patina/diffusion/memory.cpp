@@ -9,16 +9,16 @@ namespace patina::diffusion {
 namespace {
 
 /// At its peak, on the way up at the finest level, the U-Net holds so many times its finest feature map: what
-/// the way down and the ControlNets left, and a layer's input, output and scratch.
-constexpr double kUNetMaps = 24;
-/// What the ControlNets left for the second prompt of guidance while the first is evaluated, where they are
-/// not one batch: in SD 1.5 its thirteen residuals.
-constexpr double kWaitingMaps = 6.5;
+/// the way down and the ControlNets left, and a layer's input, output and scratch. Both prompts of guidance
+/// one after the other take hardly less than at once: what the second will read waits, and freed maps below
+/// malloc's largest threshold (32 MB) leave holes.
+constexpr double kUNetMaps = 24, kGuidedMaps = 48, kGuidedInTurnMaps = 45;
 /// The VAE in its last convolutions, in feature maps of its finest level: an estimate, since the U-Net was
 /// the larger in every run that was measured.
 constexpr double kVaeMaps = 4;
-/// LibTorch's libraries and what the allocator keeps from converting weights.
+/// LibTorch's libraries and what the allocator keeps.
 constexpr int64_t kLibraryBytes = 350'000'000;
+constexpr double kKeptFromConverting = 0.03;  // of the weights' bytes
 
 }  // namespace
 
@@ -31,17 +31,18 @@ DetailMemory predict_memory(const Model& model, int grid, int view_width, int vi
                 tile = networks.controlnet_tile.num_parameters() * bytes,
                 normal = networks.controlnet_normal.num_parameters() * bytes;
   DetailMemory memory;
-  memory.weights = kLibraryBytes + networks.unet.num_parameters() * bytes;
-  memory.weights +=
-      networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal});
+  const int64_t weights =
+      networks.unet.num_parameters() * bytes +
+      (networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal}));
+  memory.weights =
+      kLibraryBytes + weights + static_cast<int64_t>(kKeptFromConverting * static_cast<double>(weights));
 
   const double pixels = static_cast<double>(view_width) * view_height, views = grid * grid;
   const double latents = views * pixels / (model.latent_scale() * model.latent_scale());
   const bool guided = guidance_scale_of(options, networks.guidance) != 1;
-  const double maps = !guided ? kUNetMaps
-                      : guides_in_one_batch(networks.unet.config(), std::lround(latents))
-                          ? 2 * kUNetMaps
-                          : kUNetMaps + kWaitingMaps;
+  const double maps = !guided                                                             ? kUNetMaps
+                      : guides_in_one_batch(networks.unet.config(), std::lround(latents)) ? kGuidedMaps
+                                                                                          : kGuidedInTurnMaps;
   const double unet =
       maps * static_cast<double>(networks.unet.config().levels.front().channels * bytes) * latents;
   const double decoder =
