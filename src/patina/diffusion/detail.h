@@ -57,6 +57,9 @@ struct ModelOptions {
 /// missing, broken or a pickle.
 void check_model(const ModelPaths& paths);
 
+/// Throws Error if there is no such device here, or it does not compute in this precision.
+void check_device(Device device, Dtype dtype);
+
 /// Every file that a model is read from; what tells whether it changed.
 std::vector<std::filesystem::path> model_files(const ModelPaths& paths);
 
@@ -64,7 +67,7 @@ std::vector<std::filesystem::path> model_files(const ModelPaths& paths);
 class Model {
  public:
   /// Throws Error that names the file and tensor: missing, wrongly shaped (expected and found), malformed, a
-  /// pickle. Throws Error{kDevice} where there is no such device.
+  /// pickle. Throws as check_device.
   Model(const ModelPaths& paths, const ModelOptions& options);
   ~Model();
   Model(Model&&) noexcept;

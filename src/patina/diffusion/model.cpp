@@ -22,17 +22,12 @@ namespace {
 constexpr uintmax_t kLargeWeightBytes = 400'000'000;
 
 Device resolve(Device wanted) {
-  if (wanted == Device::kCuda && !at::hasCUDA())
-    throw Error(ErrorCode::kDevice, "--device cuda",
-                "there is no CUDA device here, or this patina was built without CUDA (docs/models.md)");
   return wanted == Device::kAuto ? (at::hasCUDA() ? Device::kCuda : Device::kCpu) : wanted;
 }
 
 /// bf16 pays where the processor multiplies it natively and the networks are large enough to be bound by
 /// arithmetic; on CUDA always, and the biased attention needs 16 bits there.
 Dtype resolve(Dtype wanted, Device device, const TensorTable& unet) {
-  if (wanted == Dtype::kF16 && device == Device::kCpu)
-    throw Error(ErrorCode::kUsage, "--dtype f16", "is for --device cuda; on a processor take bf16 or f32");
   if (wanted != Dtype::kAuto) return wanted;
   if (device == Device::kCuda) return Dtype::kBf16;
   uintmax_t bytes = 0;
@@ -91,7 +86,16 @@ void check_fit(const Model::State& state) {
 
 }  // namespace
 
+void check_device(Device device, Dtype dtype) {
+  if (device == Device::kCuda && !at::hasCUDA())
+    throw Error(ErrorCode::kDevice, "--device cuda",
+                "there is no CUDA device here, or this patina was built without CUDA (docs/models.md)");
+  if (dtype == Dtype::kF16 && resolve(device) == Device::kCpu)
+    throw Error(ErrorCode::kUsage, "--dtype f16", "is for --device cuda; on a processor take bf16 or f32");
+}
+
 Model::Model(const ModelPaths& paths, const ModelOptions& options) {
+  check_device(options.device, options.dtype);
   if (options.num_threads < 0) {
     throw Error(ErrorCode::kUsage, "threads",
                 "is " + std::to_string(options.num_threads) + ", expected 0 (all) or more");

@@ -35,6 +35,7 @@ void check_inputs(const Config& config) {
         ErrorCode::kUsage, "--model",
         "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
         "2.x; `patina models DIR` lists those in a folder");
+  diffusion::check_device(config.device, config.dtype);
   diffusion::check_model(config.model);
   if (config.output.empty()) return;
   const std::string extension = config.output.extension().string();
