@@ -56,7 +56,8 @@ Held<Network> hold_network(const NetworkPart<Config>& part, nn::Placement placem
       delete network;
       release_pages(table);
     };
-    return std::shared_ptr<const Network>(new Network(load_network<Network>(part, placement, &deltas)), release);
+    return std::shared_ptr<const Network>(new Network(load_network<Network>(part, placement, &deltas)),
+                                          release);
   };
   return Held<Network>(part.config, check_tensors<Network>(part), read);
 }

@@ -48,8 +48,8 @@ struct ModelPaths {
 
 struct ModelOptions {
   Dtype dtype = Dtype::kAuto;
-  int num_threads = 0;      // 0: all processors
-  bool low_memory = false;  // all networks but the U-Net are read anew for each use
+  int num_threads = 0;            // 0: all processors
+  bool low_memory = false;        // all networks but the U-Net are read anew for each use
   Device device = Device::kAuto;  // kAuto: CUDA where patina was built with it and finds a GPU
 };
 
@@ -101,7 +101,7 @@ struct DetailInputs {
 inline constexpr float kAutoGuidanceScale = 0;
 
 struct DetailOptions {
-  std::string prompt = {};                                   // with weights as prompt.h reads it
+  std::string prompt = {};                                    // with weights as prompt.h reads it
   std::optional<std::string> negative_prompt = std::nullopt;  // nullopt: the model's own, most often none
   int clip_skip = 1;  // 1: the whole text encoder; n leaves out its last n - 1 layers
   int num_steps = 20;
@@ -136,8 +136,9 @@ struct DetailMemory {
 DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
                             const DetailOptions& options);
 
-/// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4], and what the VAE lost
-/// of the renders put back. Encodes and decodes view by view. Returns grid² sRGB images [H,W,3] in [0,1]. Throws Error{kUsage} if sizes do not fit.
+/// Image-to-image with two ControlNets over the whole grid at once [Hadadan2025, Sec. 4], and what the VAE
+/// lost of the renders put back. Encodes and decodes view by view. Returns grid² sRGB images [H,W,3] in
+/// [0,1]. Throws Error{kUsage} if sizes do not fit.
 std::vector<Image> generate_detail(const Model& model, const DetailInputs& inputs,
                                    const DetailOptions& options, const DetailHooks& hooks,
                                    const Progress& progress);

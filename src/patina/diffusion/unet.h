@@ -68,9 +68,9 @@ struct ControlResiduals {
 };
 
 struct UNetInputs {
-  at::Tensor sample;     // [B,C,H,W] scaled latents
-  at::Tensor timesteps;  // [1] or [B] f32
-  at::Tensor text;       // [B,T,D]
+  at::Tensor sample;              // [B,C,H,W] scaled latents
+  at::Tensor timesteps;           // [1] or [B] f32
+  at::Tensor text;                // [B,T,D]
   ControlResiduals control = {};  // may be empty
   const nn::SelfAttentionBias* bias = nullptr;
 };
@@ -82,9 +82,9 @@ class UNet {
   /// Reads <folder>/config.json and the weights beside it, as `type` (f32 or bf16). Throws Error.
   UNet(const std::filesystem::path& folder, at::ScalarType type);
 
-  /// The predicted noise (or what the scheduler's prediction type says), [B,C,H,W], of the weights' type and on
-  /// their device, to which inputs go.
-  /// Takes the inputs by value, since it lets go of each residual that is used up: move them in where memory counts.
+  /// The predicted noise (or what the scheduler's prediction type says), [B,C,H,W], of the weights' type and
+  /// on their device, to which inputs go. Takes the inputs by value, since it lets go of each residual that
+  /// is used up: move them in where memory counts.
   at::Tensor operator()(UNetInputs inputs, const nn::Recorder& record = {}) const;
 
   const UNetConfig& config() const { return encoder_.config; }

@@ -61,8 +61,8 @@ struct Placement {
 /// finish() can name all of it in one message.
 class WeightReader {
  public:
-  /// Tensors become of this type and go to this device; with the processor as device they stay where the source
-  /// gives them. `source` must outlive the reader, not the tensors.
+  /// Tensors become this type and go to this device; with the processor as device they stay where the
+  /// source gives them. `source` must outlive the reader, not the tensors.
   WeightReader(WeightSource& source, Placement placement) : source_(source), placement_(placement) {}
 
   at::Tensor take(const std::string& name, std::vector<int64_t> shape) {

@@ -28,9 +28,9 @@ struct Config {
   std::vector<std::string> materials;  // names of the materials that may change; empty: all that can
 
   // How it is lit and seen.
-  std::filesystem::path environment;  // empty: the built-in studio
-  std::filesystem::path scene;        // context that is rendered and never changed; may be empty
-  std::filesystem::path cameras;      // explicit cameras instead of the orbit; may be empty
+  std::filesystem::path environment;           // empty: the built-in studio
+  std::filesystem::path scene;                 // context that is rendered and never changed; may be empty
+  std::filesystem::path cameras;               // explicit cameras instead of the orbit; may be empty
   views::OrbitOptions orbit{.resolution = 0};  // 0: what the model was trained at, see settle()
   int samples_per_pixel = 64;
   int max_depth = 6;
