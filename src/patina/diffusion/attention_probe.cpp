@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::string_view kLayerEnd = ".transformer_blocks.0.attn1";
 
-/// [B,N,C] of one layer -> [N,C] f32 of the last in the batch, which is the prompt's.
+/// [B,N,C] of one layer -> [N,C] f32 of the last in the batch, which is the prompt's; of prompts that are
+/// evaluated in turn the prompt's comes last too.
 std::vector<float> prompt_half(const at::Tensor& tokens) {
   const at::Tensor values = tokens.select(0, tokens.size(0) - 1).to(at::kFloat).contiguous();
   return {values.data_ptr<float>(), values.data_ptr<float>() + values.numel()};

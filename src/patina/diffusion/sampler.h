@@ -33,7 +33,7 @@ struct Denoiser {
   std::vector<Control> controls;
   at::Tensor text;  // [2,T,D], negative prompt first; [1,T,D] without guidance
   float guidance_scale = 1;
-  bool one_batch = true;  // both prompts of guidance in one evaluation, which takes twice the memory
+  bool one_batch = true;  // both prompts of guidance in one evaluation; else in turn, the negative one first
   const nn::SelfAttentionBias* bias = nullptr;  // null: none
   bool bias_controls = false;                   // whether it acts on the ControlNets too
   nn::Recorder record = {};                     // listens to the U-Net

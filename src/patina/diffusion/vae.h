@@ -65,8 +65,8 @@ class Vae {
   /// Error.
   Vae(const std::filesystem::path& folder, at::ScalarType type);
 
-  /// Inputs go to the device of the weights, where outputs stay.
-  /// image [B,3,H,W] in [-1,1], H and W divisible by the latent scale.
+  /// Inputs go to the device of the weights, where outputs stay. image [B,3,H,W] in [-1,1], H and W divisible
+  /// by the latent scale.
   Posterior encode(const at::Tensor& image, const nn::Recorder& record = {}) const;
   /// latents [B,C,h,w], unscaled -> image [B,3,s·h,s·w], about [-1,1].
   at::Tensor decode(const at::Tensor& latents, const nn::Recorder& record = {}) const;
