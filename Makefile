@@ -72,6 +72,11 @@ bench-unet: setup
 	@if $(PEER_PYTHON) -c "import stable_diffusion_cpp" 2> /dev/null; then \
 	  $(PEER_PYTHON) bench/unet/stable_diffusion_cpp_peer.py --report build/bench/unet.json --make build/release/make_checkpoint; \
 	else echo "No stable-diffusion.cpp beside this; how to have it:  python3 bench/unet/stable_diffusion_cpp_peer.py --help"; fi
+	@if nvidia-smi > /dev/null 2>&1; then \
+	  cmake --preset cuda -DCMAKE_PREFIX_PATH=$$($(PEER_PYTHON) -c 'import torch; print(torch.utils.cmake_prefix_path)') && \
+	  cmake --build build/cuda --parallel $(JOBS) --target bench_grid && \
+	  $(PEER_PYTHON) bench/unet/grid_table.py --report build/bench/unet.json; \
+	else echo "No GPU here; the table of whole view grids where there is one:  python3 bench/unet/grid_table.py --help"; fi
 
 gallery: setup
 	@cmake --preset release -DPATINA_BUILD_BENCH=ON

@@ -204,6 +204,11 @@ TEST(Detail, a_models_own_guidance_holds_where_none_is_given) {
   EXPECT_EQ(edited(with_own, std::nullopt, kAuto), edited(tiny_model(), "blurry", 3));
   EXPECT_EQ(edited(with_own, "", 7.5f), edited(tiny_model(), std::nullopt, kAuto));
   EXPECT_EQ(edited(with_own, "a mossy stone", kAuto), edited(tiny_model(), "a mossy stone", 3));
+  EXPECT_EQ(guidance_of(with_own, {}).scale, 3);
+  EXPECT_EQ(guidance_of(with_own, {}).negative_prompt, "blurry");
+  DetailOptions unguided;
+  unguided.guidance_scale = 1;
+  EXPECT_EQ(guidance_of(with_own, unguided).negative_prompt, "");
 
   write_file(path / "model_index.json", std::string(R"({"_guidance_scale": 0})"));
   try {

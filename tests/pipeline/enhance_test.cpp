@@ -91,6 +91,7 @@ TEST(Enhance, writes_asset_report_and_metrics) {
     EXPECT_TRUE(metrics.at("consistency").contains(name)) << name;
   EXPECT_GT(metrics.at("fit").at("psnr").get<double>(), metrics.at("fit").at("psnr_before").get<double>());
   EXPECT_TRUE(metrics.at("fit").contains("sharpness"));
+  EXPECT_EQ(metrics.at("guidance").at("scale"), 7.5);  // the model names none
   std::vector<std::string> stages;
   for (const auto& stage : metrics.at("stages")) {
     stages.push_back(stage.at("name"));

@@ -97,6 +97,13 @@ struct DetailInputs {
                                         // condition; empty: tile_views
 };
 
+/// Classifier-free guidance [Ho2022]: how strong, and from which words on. A model may name its own as
+/// `_guidance_scale` and `_negative_prompt` in model_index.json, which other programs pass over.
+struct Guidance {
+  float scale = 7.5f;
+  std::string negative_prompt = {};
+};
+
 /// DetailOptions::guidance_scale: the model's own, 7.5 where it names none.
 inline constexpr float kAutoGuidanceScale = 0;
 
@@ -117,6 +124,9 @@ struct DetailOptions {
   bool bias_controlnet = false;  // the ControlNets' self-attention too
   uint64_t seed = 0;             // of the noise that ancestral schedulers draw
 };
+
+/// What the options ask for, or the model's own where they leave it open; a scale of 1 goes with no words.
+Guidance guidance_of(const Model& model, const DetailOptions& options);
 
 /// Where a run stands between two steps, as bytes that restore it exactly; for resuming a killed run.
 struct Checkpoint {

@@ -133,8 +133,12 @@ at::Tensor tensor_from_image(const Image& image) {
   return pixels.permute({0, 3, 1, 2}).clone();
 }
 
-float guidance_scale_of(const DetailOptions& options, const GuidanceDefaults& defaults) {
-  return options.guidance_scale == kAutoGuidanceScale ? defaults.scale : options.guidance_scale;
+Guidance guidance_of(const Model& model, const DetailOptions& options) {
+  const Guidance& defaults = model.state().guidance;
+  Guidance guidance{options.guidance_scale == kAutoGuidanceScale ? defaults.scale : options.guidance_scale,
+                    options.negative_prompt.value_or(defaults.negative_prompt)};
+  if (guidance.scale == 1) guidance.negative_prompt.clear();
+  return guidance;
 }
 
 bool guides_in_one_batch(const UNetConfig& unet, int64_t latent_pixels) {
@@ -169,9 +173,8 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
   // What stays the same over all steps.
   run->bias = {inputs.bias_levels, options.bias_weight, options.bias_scaling == BiasScaling::kPaper};
   std::vector<std::string> prompts{options.prompt};
-  const float guidance_scale = guidance_scale_of(options, networks.guidance);
-  if (guidance_scale != 1)
-    prompts.insert(prompts.begin(), options.negative_prompt.value_or(networks.guidance.negative_prompt));
+  const Guidance guidance = guidance_of(model, options);
+  if (guidance.scale != 1) prompts.insert(prompts.begin(), guidance.negative_prompt);
   const at::Tensor text = encode_prompts(networks.tokenizer, *networks.text_encoder.use(), networks.words,
                                          prompts, options.clip_skip);
   run->denoiser = {
@@ -181,7 +184,7 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
        {&networks.controlnet_normal, grid_hint(networks.controlnet_normal, inputs.normal_views, sizes.grid),
         options.normal_scale}},
       text,
-      guidance_scale,
+      guidance.scale,
       guides_in_one_batch(networks.unet.config(), run->shape[2] * run->shape[3]),
       &run->bias,
       options.bias_controlnet};

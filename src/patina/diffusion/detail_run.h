@@ -43,9 +43,6 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
 /// [1,3,H,W] f32 from an image, values as they are.
 at::Tensor tensor_from_image(const Image& image);
 
-/// The scale that DetailOptions asks for, or the model's own.
-float guidance_scale_of(const DetailOptions& options, const GuidanceDefaults& defaults);
-
 /// Whether guidance evaluates both prompts at once for a grid of so many latent pixels: where that is faster,
 /// or as fast and takes little memory. By size alone: how much memory is free does not change the result.
 bool guides_in_one_batch(const UNetConfig& unet, int64_t latent_pixels);

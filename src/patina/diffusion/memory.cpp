@@ -39,7 +39,7 @@ DetailMemory predict_memory(const Model& model, int grid, int view_width, int vi
 
   const double pixels = static_cast<double>(view_width) * view_height, views = grid * grid;
   const double latents = views * pixels / (model.latent_scale() * model.latent_scale());
-  const bool guided = guidance_scale_of(options, networks.guidance) != 1;
+  const bool guided = guidance_of(model, options).scale != 1;
   const double maps = !guided                                                             ? kUNetMaps
                       : guides_in_one_batch(networks.unet.config(), std::lround(latents)) ? kGuidedMaps
                                                                                           : kGuidedInTurnMaps;

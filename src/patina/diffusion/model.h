@@ -25,7 +25,7 @@ struct Model::State {
   Held<Vae> vae;
   Held<ControlNet> controlnet_tile, controlnet_normal;
   SchedulerConfig scheduler;
-  GuidanceDefaults guidance;
+  Guidance guidance;  // where the user names nothing else
   LearnedWords words;
   std::vector<std::string> notes;  // what was chosen without being told to, for the description
 };

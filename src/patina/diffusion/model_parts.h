@@ -15,13 +15,6 @@
 
 namespace patina::diffusion {
 
-/// What guidance is where the user names nothing else: `_guidance_scale` and `_negative_prompt` of
-/// model_index.json, which other programs pass over.
-struct GuidanceDefaults {
-  float scale = 7.5f;
-  std::string negative_prompt;
-};
-
 struct ModelParts {
   Family family = Family::kSd1;
   UNetPart unet;
@@ -31,7 +24,7 @@ struct ModelParts {
   std::filesystem::path tokenizer;
   std::optional<int64_t> pad_id;  // of the tokenizer, where the family wants another than its files say
   SchedulerConfig scheduler;
-  GuidanceDefaults guidance;
+  Guidance guidance;            // where the user names nothing else
   bool ask_prediction = false;  // nothing tells what the U-Net predicts: it must be asked (prediction.h)
   LoraSet loras;
   std::vector<LearnedWord> words;

@@ -219,7 +219,7 @@ report::AblationPage make_page(const Workbench& bench, const RenderedViews& view
 
   report::AblationPage page;
   page.title = bench.asset.path.filename().string();
-  page.prompt = config.detail.prompt, page.negative_prompt = config.detail.negative_prompt.value_or("");
+  page.prompt = config.detail.prompt, page.negative_prompt = negative_prompt_of(*runs[0].folder);
   for (const CropWindow& window : windows)
     page.crop_titles.push_back(fmt::format("View {}", window.view + 1));
   page.conditioning = pictures_of(views.tile, windows, true);

@@ -51,6 +51,7 @@ ShownAttention show_attention(const Config& config, const AttentionOptions& opti
   diffusion::DetailOptions detail = config.detail;
   detail.seed = config.seed;
   ShownAttention shown;
+  shown.negative_prompt = diffusion::guidance_of(model, detail).negative_prompt;
   shown.captured =
       diffusion::capture_attention(model, prepared.inputs, detail, layer, options.evaluation, progress);
   if (shown.captured.bias_level < 0)
@@ -93,7 +94,7 @@ void write_attention(const ShownAttention& shown, const Config& config, const fs
   const diffusion::CapturedAttention& c = shown.captured;
   report::AttentionPage page;
   page.title = config.asset.filename().string();
-  page.prompt = config.detail.prompt, page.negative_prompt = config.detail.negative_prompt.value_or("");
+  page.prompt = config.detail.prompt, page.negative_prompt = shown.negative_prompt;
   page.figure = shown.figure;
   page.beta = c.beta;
   const bool additive = config.detail.bias_scaling == diffusion::BiasScaling::kAdditive;

@@ -22,8 +22,9 @@ struct AttentionOptions {
 struct ShownAttention {
   report::AttentionFigure figure;
   diffusion::CapturedAttention captured;
-  int view = 0;      // of the query, counted from 0
-  vec2 pixel{0.0f};  // where the point is seen in it
+  std::string negative_prompt;  // what guidance went away from
+  int view = 0;                 // of the query, counted from 0
+  vec2 pixel{0.0f};             // where the point is seen in it
 };
 
 /// Renders the views into `run` (or takes those that are there), runs the model up to the evaluation, the

@@ -154,10 +154,12 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
     }
+    const diffusion::Guidance guidance = diffusion::guidance_of(*model, options);
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model->latent_channels());
     result.metrics = {
         {"noise", prepared.noise_metrics},
         {"model", model->description()},
+        {"guidance", {{"scale", guidance.scale}, {"negative_prompt", guidance.negative_prompt}}},
         {"latent_pixels", latent_pixels},
         {"memory_mb",
          {{"predicted", megabytes(bytes_before + (loads ? memory.weights : 0) + memory.activations)},
@@ -180,6 +182,12 @@ std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run)
     edited.push_back(read_rgb_sized(run.file(numbered("detail/edited", v, ".png")), views.tile[v].width,
                                     views.tile[v].height));
   return edited;
+}
+
+std::string negative_prompt_of(const RunFolder& run) {
+  const StageRecord* detail = run.stage("detail");
+  if (!detail) return {};
+  return detail->metrics.value("/guidance/negative_prompt"_json_pointer, std::string());
 }
 
 }  // namespace patina::pipeline

@@ -126,7 +126,7 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
       report::write_fit_preview(run.file(std::string(kPreviewFolder) + "/preview.html"),
                                 {.title = bench.asset.path.filename().string(),
                                  .prompt = config.detail.prompt,
-                                 .negative_prompt = config.detail.negative_prompt.value_or(""),
+                                 .negative_prompt = negative_prompt_of(run),
                                  .edited = edited,
                                  .rendered = preview.rendered,
                                  .loss = preview.loss,

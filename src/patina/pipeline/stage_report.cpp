@@ -72,7 +72,7 @@ json gather_metrics(const RunFolder& run, const json& measured) {
     for (const auto& [name, value] : render->metrics.items()) metrics[name] = value;
   if (const StageRecord* detail = run.stage("detail")) {
     metrics["noise"] = detail->metrics.value("noise", json::object());
-    metrics["model"] = detail->metrics.value("model", json());
+    for (const char* name : {"model", "guidance"}) metrics[name] = detail->metrics.value(name, json());
   }
   if (const StageRecord* fit = run.stage("fit")) {
     for (const char* name : {"training_psnr", "density"})
@@ -133,7 +133,7 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
   report::ReportData page;
   page.title = bench.asset.path.filename().string();
   page.prompt = config.detail.prompt;
-  page.negative_prompt = config.detail.negative_prompt.value_or("");
+  page.negative_prompt = negative_prompt_of(run);
   page.before = views.tile;
   page.edited.assign(edited.begin(), edited.end());
   page.after = read_numbered(run, "report/rendered", bench.cameras);

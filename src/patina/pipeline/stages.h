@@ -63,6 +63,10 @@ RenderedViews load_views(const Workbench& bench, const RunFolder& run);
 std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run);
 FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run);
 
+/// What the edited views of the run folder were guided away from, for those who look; empty where nothing
+/// was.
+std::string negative_prompt_of(const RunFolder& run);
+
 /// A picture of a run folder as [height,width,3]; an alpha channel that a paint program added is dropped.
 /// Throws Error{kFormat} on another size.
 Image read_rgb_sized(const std::filesystem::path& path, int width, int height);

@@ -42,7 +42,7 @@ std::string page_heading(std::string_view kind, std::string_view title, std::str
       fmt::format("<header>\n<p class=\"mark\">{}</p>\n<h1>{}</h1>\n", escaped(kind), escaped(title, 200));
   if (!prompt.empty()) html += "<p class=\"prompt\">" + escaped(prompt) + "</p>\n";
   if (!negative_prompt.empty())
-    html += "<p class=\"negative\">without <em>" + escaped(negative_prompt) + "</em></p>\n";
+    html += "<p class=\"negative\">away from <em>" + escaped(negative_prompt) + "</em></p>\n";
   if (!facts.empty()) {
     html += "<ul class=\"facts\">";
     for (const std::string& fact : facts) html += "<li>" + fact + "</li>";

@@ -1,0 +1,181 @@
+// What a whole view grid costs at Stable Diffusion 1.5's full size, with random weights: views encoded one by
+// one, guided steps of the U-Net and both ControlNets under the attention bias, views decoded one by one.
+// Prints JSON: seconds of each and the memory at the most.
+//
+//   bench_grid BIAS.safetensors [--steps 4] [--device cpu|cuda] [--dtype bf16|f16|f32]
+//
+// grid_table.py writes BIAS.safetensors, runs this beside its peer and makes the table. What the bias
+// corresponds to says how many views there are, and of what size.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <ATen/ATen.h>
+#include <ATen/Parallel.h>
+#include <c10/core/InferenceMode.h>
+#include <nlohmann/json.hpp>
+
+#include "device_memory.h"
+#include "make_checkpoint/configs.h"
+#include "patina/base/error.h"
+#include "patina/base/parallel.h"
+#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/sampler.h"
+#include "patina/diffusion/vae.h"
+#include "patina/nn/threads.h"
+#include "random_weights.h"
+
+namespace {
+
+using namespace patina;
+using diffusion::ControlNet;
+using diffusion::Held;
+
+constexpr int kSteps = 20;  // of the whole schedule, of which some are measured
+constexpr float kGuidanceScale = 7.5f;
+constexpr float kBiasWeight = 1.2f;  // patina's default
+
+double seconds_of(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::vector<int32_t> integers(const nn::SafeTensors& file, const std::string& name) {
+  const nn::TensorEntry* entry = file.find(name);
+  if (!entry) throw Error(ErrorCode::kFormat, file.path().string(), "has no tensor " + name);
+  const at::Tensor tensor = nn::read_tensor(file, *entry, at::kInt).contiguous();
+  return {tensor.data_ptr<int>(), tensor.data_ptr<int>() + tensor.numel()};
+}
+
+int number(const nn::SafeTensors& file, const std::string& name) {
+  const auto found = file.metadata().find(name);
+  if (found == file.metadata().end())
+    throw Error(ErrorCode::kFormat, file.path().string(), "says no " + name);
+  return std::stoi(found->second);
+}
+
+/// The levels of the bias, finest first.
+std::vector<attention::KeyBuckets> read_bias(const std::filesystem::path& path) {
+  const nn::SafeTensors file(path);
+  std::vector<attention::KeyBuckets> levels;
+  for (int level = 0; file.find("keys_" + std::to_string(level)); ++level) {
+    const std::string suffix = "_" + std::to_string(level);
+    attention::KeyBuckets buckets;
+    buckets.grid = number(file, "grid");
+    buckets.view_width = buckets.view_height = number(file, "view" + suffix);
+    buckets.window_radius = number(file, "radius" + suffix);
+    buckets.offsets = integers(file, "offsets" + suffix);
+    buckets.keys = integers(file, "keys" + suffix);
+    attention::validate(buckets);
+    levels.push_back(std::move(buckets));
+  }
+  if (levels.empty())
+    throw Error(ErrorCode::kFormat, path.string(), "holds no level of a bias: keys_0 is missing");
+  return levels;
+}
+
+template <class Network, class Config>
+Network random_network(const Config& config, nn::Placement placement) {
+  bench::RandomWeights weights;
+  nn::WeightReader reader(weights, placement);
+  return Network(config, reader);
+}
+
+nlohmann::json measure(const std::vector<attention::KeyBuckets>& levels, int steps, nn::Placement placement) {
+  const c10::InferenceMode inference;
+  at::manual_seed(1);
+  const make_checkpoint::Configs configs =
+      make_checkpoint::configs_of(diffusion::Family::kSd1, make_checkpoint::Size::kFull);
+  const auto vae = random_network<diffusion::Vae>(configs.vae, placement);
+  const auto unet = random_network<diffusion::UNet>(configs.unet, placement);
+  const Held<ControlNet> tile(random_network<ControlNet>(configs.controlnet, placement)),
+      normal(random_network<ControlNet>(configs.controlnet, placement));
+
+  const int64_t width = levels.front().width(), view = levels.front().view_width,
+                num_views = levels.front().grid * levels.front().grid;
+  nlohmann::json result;
+  const at::Tensor image = at::rand({1, 3, 8 * view, 8 * view});
+  const auto encode_views = [&] {
+    for (int64_t i = 0; i < num_views; ++i) vae.encode(2 * image - 1).mean.cpu();
+  };
+  encode_views();  // compiles, uploads and takes memory
+  result["encode_seconds"] = seconds_of(encode_views);
+
+  const nn::SelfAttentionBias bias{levels, kBiasWeight};
+  const at::Tensor hint_image = at::rand({1, 3, 8 * width, 8 * width});
+  const diffusion::Denoiser denoiser{
+      &unet,
+      {{&tile, tile.use()->hint(hint_image), 1}, {&normal, normal.use()->hint(hint_image), 1}},
+      at::randn({2, 77, configs.text_encoder.hidden_size}),
+      kGuidanceScale,
+      diffusion::guides_in_one_batch(unet.config(), width * width),
+      &bias};
+  diffusion::SchedulerConfig scheduler;
+  scheduler.solver = diffusion::Solver::kUniPc;
+  const diffusion::SchedulePlan plan = make_schedule(scheduler, kSteps);
+  const at::Tensor start = at::randn({1, 4, width, width});
+  diffusion::SamplerState state;
+  state.latents.assign(start.data_ptr<float>(), start.data_ptr<float>() + start.numel());
+  std::vector<double> at_step{0};
+  const auto begin = std::chrono::steady_clock::now();
+  const diffusion::SamplerCallbacks callbacks{
+      {},
+      [&](const diffusion::SamplerState&, const diffusion::Guided&) {
+        at_step.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+      },
+      1 + steps};
+  sample(denoiser, plan, std::move(state), start.sizes(), callbacks);
+  result["first_step_seconds"] = at_step[1];
+  result["step_seconds"] = (at_step.back() - at_step[1]) / steps;
+
+  const at::Tensor latents = at::randn({1, 4, view, view});
+  const auto decode_views = [&] {
+    for (int64_t i = 0; i < num_views; ++i) vae.decode(latents).cpu();
+  };
+  decode_views();
+  result["decode_seconds"] = seconds_of(decode_views);
+  result["peak_gb"] = static_cast<double>(bench::peak_bytes(placement.device)) * 1e-9;
+  return result;
+}
+
+int usage() {
+  std::fprintf(stderr,
+               "usage: bench_grid BIAS.safetensors [--steps 4] [--device cpu|cuda] [--dtype bf16|f16|f32]\n");
+  return 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  nn::sleep_between_parallel_regions(argv);
+  std::string bias_file;
+  int steps = 4;
+  nn::Placement placement(at::kBFloat16);
+  for (int i = 1; i < argc; ++i) {
+    const std::string flag = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
+    if (flag.rfind("--", 0) != 0) {
+      bias_file = flag;
+      continue;
+    }
+    ++i;
+    if (flag == "--steps")
+      steps = std::clamp(std::atoi(value.c_str()), 1, kSteps - 1);
+    else if (flag == "--device" && (value == "cpu" || value == "cuda"))
+      placement.device = value == "cpu" ? c10::kCPU : c10::kCUDA;
+    else if (flag == "--dtype" && (value == "bf16" || value == "f16" || value == "f32"))
+      placement.type = value == "bf16" ? at::kBFloat16 : value == "f16" ? at::kHalf : at::kFloat;
+    else
+      return usage();
+  }
+  if (bias_file.empty()) return usage();
+  at::set_num_threads(num_threads());
+  std::printf("%s\n", measure(read_bias(bias_file), steps, placement).dump(1).c_str());
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "bench_grid: %s\n", error.what());
+  return 1;
+}
