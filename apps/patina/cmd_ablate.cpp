@@ -73,9 +73,9 @@ void add_ablate(CLI::App& program) {
   command
       ->add_option(
           "--bias-scaling", own->scalings,
-          "paper (w divided by the square root of the head dimension), additive (added after it), or both. "
-          "[paper]")
-      ->type_name("paper|additive")
+          "additive (w is added to the scaled scores), paper (divided with them by the square root of the "
+          "head dimension), or both. [additive]")
+      ->type_name("additive|paper")
       ->expected(1, kMany)
       ->group("Comparison");
   command

@@ -44,7 +44,7 @@ struct Arguments {
   int views = 4, ablation_views = 9, steps = 20, num_assets = 5, threads = 0;
   float guidance_scale = diffusion::kAutoGuidanceScale, fine_detail = 1;
   std::optional<std::string> negative_prompt;
-  std::vector<float> weights{0, 1.2f, 2, 3};
+  std::vector<float> weights{0, 1.2f, 1.8f, 3};
 
   bool asks_for(const std::string& part) const {
     return only.empty() || std::find(only.begin(), only.end(), part) != only.end();

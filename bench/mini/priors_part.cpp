@@ -76,14 +76,14 @@ json measure_sweep(std::span<const HeldOutAsset> assets, const EditSettings& set
   AblationOptions options;
   options.noise_paper = false;
   options.fit = false;
-  options.scalings = {diffusion::BiasScaling::kPaper, diffusion::BiasScaling::kAdditive};
+  options.scalings = {diffusion::BiasScaling::kAdditive, diffusion::BiasScaling::kPaper};
   options.weights.clear();
   for (const float w : weights)
     if (w > 0) options.weights.push_back(w);
   std::vector<json> all;
   for (const HeldOutAsset& asset : assets) all.push_back(ablated(asset, settings, options, folder));
 
-  // Steps come in this order: baseline, tile, exact noise, every w in paper scaling, every w in additive.
+  // Steps come in this order: baseline, tile, exact noise, every w added, every w scaled.
   constexpr size_t kNoBias = 2;
   const size_t num_weights = options.weights.size();
   PATINA_CHECK_EQ(all[0].size(), kNoBias + 1 + 2 * num_weights);
@@ -91,7 +91,7 @@ json measure_sweep(std::span<const HeldOutAsset> assets, const EditSettings& set
   for (const float w : options.weights) out["w"].push_back(std::round(w * 1e3) / 1e3);
   for (size_t scaling = 0; scaling < 2; ++scaling)
     for (const char* measure : {"edit_correlation", "edit_psnr", "edit_sharpness"}) {
-      json& curve = out[scaling == 0 ? "paper" : "additive"][measure];
+      json& curve = out[scaling == 0 ? "additive" : "paper"][measure];
       curve.push_back(mean_of(all, kNoBias, measure));
       for (size_t i = 0; i < num_weights; ++i)
         curve.push_back(mean_of(all, kNoBias + 1 + scaling * num_weights + i, measure));

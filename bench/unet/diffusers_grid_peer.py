@@ -16,7 +16,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-STEPS, GUIDANCE, WEIGHT = 20, 7.5, 1.2  # as in grid.cpp
+STEPS, GUIDANCE, WEIGHT = 20, 7.5, 1.8  # as in grid.cpp
 RADII = (4, 2, 1, 0)  # of the bias's windows at the U-Net's four resolutions
 
 
@@ -52,7 +52,7 @@ def add_bias(unet, grid, view, device):
             pixels = (grid * view >> level_of(name)) ** 2
             if pixels not in biases:
                 level, table = tables[pixels]
-                biases[pixels] = FlexBias(level, table, WEIGHT * module.scale)  # scaled as the scores are
+                biases[pixels] = FlexBias(level, table, WEIGHT)
     processor = biased_processor(biases)
     unet.set_attn_processor(
         {

@@ -128,10 +128,10 @@ TEST(Detail, a_bias_of_zero_is_none_and_another_is_felt) {
   DetailOptions options = short_options();
   EXPECT_EQ(run(inputs, options)[0].pixels, plain[0].pixels);
   options.bias_weight = 4;
-  const std::vector<Image> paper = run(inputs, options);
-  EXPECT_GT(max_difference(paper[0], plain[0]), 1e-3);
-  options.bias_scaling = BiasScaling::kAdditive;
-  EXPECT_GT(max_difference(run(inputs, options)[0], paper[0]), 1e-3);
+  const std::vector<Image> additive = run(inputs, options);
+  EXPECT_GT(max_difference(additive[0], plain[0]), 1e-3);
+  options.bias_scaling = BiasScaling::kPaper;
+  EXPECT_GT(max_difference(run(inputs, options)[0], additive[0]), 1e-3);
 }
 
 TEST(Detail, the_bias_of_controlnets_is_felt_only_where_it_is_asked_for) {

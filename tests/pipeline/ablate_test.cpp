@@ -200,7 +200,7 @@ TEST(Ablate, every_step_changes_one_thing) {
   config.seed = 3;
   AblationOptions options;
   options.weights = {0.6f, 1.8f};
-  options.scalings = {diffusion::BiasScaling::kPaper, diffusion::BiasScaling::kAdditive};
+  options.scalings = {diffusion::BiasScaling::kAdditive, diffusion::BiasScaling::kPaper};
   options.view_counts = {16, 4};
   const std::vector<AblationStep> steps = ablation_steps(config, options, "out");
   ASSERT_EQ(steps.size(), 8u);
@@ -215,13 +215,13 @@ TEST(Ablate, every_step_changes_one_thing) {
     EXPECT_EQ(c.detail.tile_scale, i == 0 ? 0.0f : 0.7f);
     EXPECT_EQ(c.noise, noise[i]);
     EXPECT_EQ(c.detail.bias_weight, weight[i]);
-    EXPECT_EQ(c.detail.bias_scaling == diffusion::BiasScaling::kAdditive, i >= 6);
+    EXPECT_EQ(c.detail.bias_scaling == diffusion::BiasScaling::kPaper, i >= 6);
     EXPECT_EQ(c.orbit.num_views, 16);
     EXPECT_EQ(c.seed, 3u);
     folders.insert(c.run.string());
   }
   EXPECT_EQ(folders.size(), steps.size());
-  EXPECT_TRUE(folders.count("out/steps/bias-0.6-additive"));
+  EXPECT_TRUE(folders.count("out/steps/bias-0.6-paper"));
 }
 
 TEST(Ablate, refuses_what_would_compare_a_step_with_itself) {

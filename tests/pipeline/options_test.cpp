@@ -49,8 +49,8 @@ TEST(Options, every_value_survives_a_round_trip_through_json) {
   set(config, "strength", {"0.35"});
   set(config, "scheduler", {"dpm++2m-karras"});
   set(config, "noise", {"paper"});
-  set(config, "bias", {"1.8"});
-  set(config, "bias-scaling", {"additive"});
+  set(config, "bias", {"1.2"});
+  set(config, "bias-scaling", {"paper"});
   set(config, "bias-controlnet", {"true"});
   set(config, "fit", {"base_color,metallic"});
   set(config, "material", {"lid", "body"});

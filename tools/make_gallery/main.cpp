@@ -1,7 +1,7 @@
-// Makes the gallery: every asset with its prompt through `patina enhance`, a strip of pictures of each, and
-// the page that shows them. Goes on where it was stopped.
+// Makes the gallery: every asset with its prompt through `patina enhance`, a strip of pictures of each, what
+// the main options do, and the page that shows it all. Goes on where it was stopped.
 //
-//   make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] [--only NAME]
+//   make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] [--only NAME|OPTION]
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "mini_data/console.h"
+#include "option_sheet.h"
 #include "patina/asset/asset.h"
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
@@ -51,6 +52,17 @@ constexpr Entry kEntries[] = {
     {"spot_terracotta", "Spot/spot_triangulated.obj", "a terracotta cow", 1.0f, 1, 5},
 };
 
+// Of the options that an edit is steered with, with the values of the paper's figures.
+const make_gallery::OptionSheet kSheets[] = {
+    {"strength", {"0.2", "0.4", "0.6", "0.8", "0.9", "1"}},
+    {"tile-scale", {"1", "0.8", "0.6", "0.4", "0.2", "0"}},
+    {"guidance-scale", {"1", "2", "4", "7.5", "12", "21.5"}},
+};
+constexpr Entry kSheetEdits[] = {
+    {"", "examples/kettle.glb", "a rusty old kettle", 1.0f, 0, 0},
+    {"", "WaterBottle/WaterBottle.gltf", "a bottle covered in moss", 1.0f, 0, 0},
+};
+
 struct Arguments {
   fs::path model = "models/patina-mini", shared = "../shared", work = "build/gallery", docs = "docs";
   std::string only;
@@ -69,18 +81,32 @@ std::string section(const Entry& entry, const fs::path& asset) {
       entry.strength < 1 ? fmt::format(" --strength {}", entry.strength) : "");
 }
 
-fs::path picture_path(const Entry& entry, const Arguments& arguments) {
-  return arguments.docs / "images" / "gallery" / (std::string(entry.name) + ".jpg");
+/// Markdown of one option.
+std::string section(const make_gallery::OptionSheet& sheet) {
+  std::string values;
+  for (const std::string& value : sheet.values) values += (values.empty() ? "" : ", ") + value;
+  return fmt::format("![Rendered; edited with --{0} {1}](images/gallery/option_{0}.jpg)\n\n`--{0}` {1}\n\n",
+                     sheet.option, values);
 }
 
-void make_picture(const Entry& entry, const Arguments& arguments) {
+fs::path picture_path(const std::string& name, const Arguments& arguments) {
+  return arguments.docs / "images" / "gallery" / (name + ".jpg");
+}
+
+/// What entry asks for; the other options are patina's defaults.
+pipeline::Config config_of(const Entry& entry, const Arguments& arguments) {
   pipeline::Config config;
   config.asset = asset_path(entry, arguments);
-  config.output = arguments.work / (std::string(entry.name) + ".glb");
   config.detail.prompt = entry.prompt;
   config.detail.strength = entry.strength;
   config.model.model = arguments.model;
   config.turntable_frames = 0;
+  return config;
+}
+
+void make_picture(const Entry& entry, const Arguments& arguments) {
+  pipeline::Config config = config_of(entry, arguments);
+  config.output = arguments.work / (std::string(entry.name) + ".glb");
   pipeline::settle(config);
   fs::create_directories(arguments.work);
   const fs::path folder = pipeline::run_folder_path(config);
@@ -88,20 +114,42 @@ void make_picture(const Entry& entry, const Arguments& arguments) {
     pipeline::RunFolder run(folder);
     pipeline::enhance(config, run, mini_data::console_progress());
   }
-  write_image(picture_path(entry, arguments),
+  write_image(picture_path(entry.name, arguments),
               make_gallery::strip(folder, asset::read_asset(config.asset), asset::read_asset(config.output),
                                   entry.view, entry.other_view, kSide));
 }
 
+void make_sheet(const make_gallery::OptionSheet& sheet, const Arguments& arguments) {
+  std::vector<pipeline::Config> edits;
+  for (const Entry& entry : kSheetEdits) {
+    edits.push_back(config_of(entry, arguments));
+    edits.back().orbit.num_views = 4;
+  }
+  write_image(picture_path("option_" + sheet.option, arguments),
+              make_gallery::option_sheet(sheet, edits, arguments.work / "options", kSheetEdits[0].view, kSide,
+                                         mini_data::console_progress()));
+}
+
 void make(const Arguments& arguments) {
+  const auto asked = [&](const std::string& name) {
+    return arguments.only.empty() || arguments.only == name;
+  };
   for (const Entry& entry : kEntries) {
-    if (!arguments.only.empty() && arguments.only != entry.name) continue;
+    if (!asked(entry.name)) continue;
     make_picture(entry, arguments);
     std::printf("%s\n", entry.name);
   }
+  for (const make_gallery::OptionSheet& sheet : kSheets) {
+    if (!asked(sheet.option)) continue;
+    make_sheet(sheet, arguments);
+    std::printf("%s\n", sheet.option.c_str());
+  }
   std::string page = read_text_file("tools/make_gallery/head.md");
   for (const Entry& entry : kEntries)
-    if (fs::exists(picture_path(entry, arguments))) page += section(entry, asset_path(entry, arguments));
+    if (fs::exists(picture_path(entry.name, arguments))) page += section(entry, asset_path(entry, arguments));
+  page += read_text_file("tools/make_gallery/options.md");
+  for (const make_gallery::OptionSheet& sheet : kSheets)
+    if (fs::exists(picture_path("option_" + sheet.option, arguments))) page += section(sheet);
   write_file(arguments.docs / "gallery.md", page);
 }
 
@@ -122,7 +170,7 @@ int main(int argc, char** argv) {
     } else {
       std::fprintf(stderr,
                    "usage: make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] "
-                   "[--only NAME]\n");
+                   "[--only NAME|OPTION]\n");
       return 2;
     }
   }

@@ -21,7 +21,7 @@ namespace patina::diffusion {
 enum class Scheduler { kDdim, kPndm, kEuler, kEulerAncestral, kDpmSolverPp2m, kDpmSolverPp2mKarras, kUniPc };
 enum class Dtype { kAuto, kF32, kBf16, kF16 };  // kF16: on CUDA alone
 enum class Device { kAuto, kCpu, kCuda };
-enum class BiasScaling { kPaper, kAdditive };  // β = w/√d or β = w
+enum class BiasScaling { kAdditive, kPaper };  // β = w or β = w/√d
 
 enum class PredictionChoice { kAuto, kEpsilon, kV };  // what the U-Net was trained to tell
 
@@ -120,7 +120,7 @@ struct DetailOptions {
   float fine_detail = 1.0f;
   Scheduler scheduler = Scheduler::kUniPc;
   float bias_weight = 0;  // w; 0: no bias
-  BiasScaling bias_scaling = BiasScaling::kPaper;
+  BiasScaling bias_scaling = BiasScaling::kAdditive;
   bool bias_controlnet = false;  // the ControlNets' self-attention too
   uint64_t seed = 0;             // of the noise that ancestral schedulers draw
 };

@@ -16,7 +16,7 @@ namespace patina::pipeline {
 
 struct AblationOptions {
   std::vector<float> weights{0.6f, 1.2f, 1.8f, 2.4f};  // w of the steps with attention bias; may be empty
-  std::vector<diffusion::BiasScaling> scalings{diffusion::BiasScaling::kPaper};  // each with every w
+  std::vector<diffusion::BiasScaling> scalings{diffusion::BiasScaling::kAdditive};  // each with every w
   /// The steps are made with the first; time and memory of the last step are measured with all. Empty: with
   /// what the configuration says.
   std::vector<int> view_counts;
@@ -25,7 +25,7 @@ struct AblationOptions {
   PointOptions point;       // that the crops show
 };
 
-/// One configuration of the comparison. `name` is its folder: "noise-exact", "bias-1.2", "bias-1.2-additive".
+/// One configuration of the comparison. `name` is its folder: "noise-exact", "bias-1.2", "bias-1.2-paper".
 struct AblationStep {
   std::string name;
   std::string title, note;  // for people: "+ attention bias", "w = 1.2"

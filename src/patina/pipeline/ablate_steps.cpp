@@ -43,11 +43,11 @@ std::vector<AblationStep> ablation_steps(const Config& config, const AblationOpt
     for (const float weight : options.weights) {
       if (weight == 0)
         throw Error(ErrorCode::kUsage, "--weights", "0 is no bias, which is the step noise-exact");
-      const bool additive = scaling == BiasScaling::kAdditive;
+      const bool paper = scaling == BiasScaling::kPaper;
       current.detail.bias_weight = weight;
       current.detail.bias_scaling = scaling;
-      add(fmt::format("bias-{}{}", weight, additive ? "-additive" : ""), "+ attention bias",
-          fmt::format("w = {}{}", weight, additive ? ", added after scaling" : ""));
+      add(fmt::format("bias-{}{}", weight, paper ? "-paper" : ""), "+ attention bias",
+          fmt::format("w = {}{}", weight, paper ? ", scaled with the scores" : ""));
     }
   return steps;
 }

@@ -42,8 +42,7 @@ struct Config {
   diffusion::Dtype dtype = diffusion::Dtype::kAuto;
   diffusion::Device device = diffusion::Device::kAuto;
   bool low_memory = false;
-  diffusion::DetailOptions detail{.bias_weight =
-                                      1.2f};  // the paper's 1.2 to 1.8, its careful end [Hadadan2025, Fig. 5]
+  diffusion::DetailOptions detail{.bias_weight = 1.8f};  // docs/decisions/0012
   correspond::NoiseMode noise = correspond::NoiseMode::kExact;
 
   // How the detail is carried into the textures.

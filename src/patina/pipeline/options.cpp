@@ -331,7 +331,7 @@ std::vector<Option> make_options() {
        .group = priors,
        .placeholder = "W",
        .help = "Attention bias w between latent pixels that see the same surface point; 0 switches it off, "
-               "1.2 to 1.8 is usual.",
+               "1.2 to 1.8 is usual, more makes views agree more.",
        .stages = kDetailStage},
       -20.0f, 20.0f, [](Config & c) -> auto& { return c.detail.bias_weight; }));
   add(choice_option<BiasScaling>(
@@ -339,9 +339,11 @@ std::vector<Option> make_options() {
        .aliases = {},
        .group = priors,
        .placeholder = "",
-       .help = "Whether w is divided by the square root of the head dimension (paper) or added after it.",
+       .help = "Whether w is added to the scaled scores (additive) or before they are divided by the square "
+               "root of "
+               "the head dimension, as the paper's formula has it (paper), where it does six times less.",
        .stages = kDetailStage},
-      {{"paper", BiasScaling::kPaper}, {"additive", BiasScaling::kAdditive}},
+      {{"additive", BiasScaling::kAdditive}, {"paper", BiasScaling::kPaper}},
       [](Config & c) -> auto& { return c.detail.bias_scaling; }));
   add(flag_option(
       {.name = "bias-controlnet",

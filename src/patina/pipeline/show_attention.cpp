@@ -97,7 +97,7 @@ void write_attention(const ShownAttention& shown, const Config& config, const fs
   page.prompt = config.detail.prompt, page.negative_prompt = shown.negative_prompt;
   page.figure = shown.figure;
   page.beta = c.beta;
-  const bool additive = config.detail.bias_scaling == diffusion::BiasScaling::kAdditive;
+  const bool scaled = config.detail.bias_scaling == diffusion::BiasScaling::kPaper;
   page.facts = {fmt::format("layer <b>{}</b>", report::escaped(diffusion::short_name(c.layer))),
                 fmt::format("<b>{} × {}</b> latent pixels", c.layer.width, c.layer.height),
                 fmt::format("<b>{}</b> heads of <b>{}</b>", c.layer.num_heads, c.layer.head_dim),
@@ -106,7 +106,7 @@ void write_attention(const ShownAttention& shown, const Config& config, const fs
                 fmt::format("view <b>{}</b>, pixel <b>{:.0f}, {:.0f}</b>", shown.view + 1,
                             std::floor(shown.pixel.x), std::floor(shown.pixel.y)),
                 fmt::format("w = <b>{}</b>, β = {} = <b>{}</b>", config.detail.bias_weight,
-                            additive ? "w" : "w/√d", report::number(c.beta))};
+                            scaled ? "w/√d" : "w", report::number(c.beta))};
   report::write_attention_page(path, page);
 }
 
