@@ -32,7 +32,7 @@ namespace {
 using namespace patina;
 using namespace patina::attention;
 
-constexpr float kBeta = 1.2f;  // the command line's default weight, unscaled
+constexpr float kBeta = 1.2f;  // time does not depend on it
 
 std::vector<KeyBuckets> buckets_of(const std::filesystem::path& path) {
   const asset::Asset asset = asset::read_asset(path);

@@ -80,7 +80,10 @@ TEST(AttentionProbe, the_bias_raises_the_share_of_its_keys_by_the_predicted_fact
   const int64_t query = 300;
   const std::vector<int32_t> keys = attention::biased_keys(captured.inputs.bias_levels[0], query);
   ASSERT_FALSE(keys.empty());
-  EXPECT_NEAR(c.beta, 2 / std::sqrt(static_cast<double>(c.layer.head_dim)), 1e-6);
+  EXPECT_EQ(c.beta, 2);
+  DetailOptions scaled = biased_options();
+  scaled.bias_scaling = BiasScaling::kPaper;
+  EXPECT_NEAR(Captured(scaled).attention.beta, 2 / std::sqrt(static_cast<double>(c.layer.head_dim)), 1e-6);
   // With p a head's share of the biased keys, the bias makes it e^β p / (1 + (e^β − 1) p).
   double predicted = 0, without = 0;
   const double boost = std::exp(static_cast<double>(c.beta));
