@@ -43,7 +43,7 @@ std::string hash_of_all(const fs::path& path) {
   if (!fs::is_directory(path)) return hash_file(path);
   std::vector<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(path))
-    if (entry.is_regular_file()) files.push_back(entry.path());
+    if (entry.is_regular_file() && entry.path().extension() != ".md") files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::string text;
   for (const fs::path& file : files) text += fs::relative(file, path).string() + " " + hash_file(file) + "\n";

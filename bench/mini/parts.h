@@ -19,7 +19,8 @@ std::optional<nlohmann::json> kept_result(const std::filesystem::path& folder, c
 nlohmann::json kept_part(const std::filesystem::path& folder, const std::string& name, const std::string& key,
                          const std::function<nlohmann::json()>& work);
 
-/// Hash of the names and contents of all files in a folder, or of one file. Throws Error{kNotFound}.
+/// Hash of the names and contents of all files in a folder, or of one file; what is written about them (*.md)
+/// does not count. Throws Error{kNotFound}.
 std::string hash_of_all(const std::filesystem::path& path);
 
 }  // namespace patina::bench

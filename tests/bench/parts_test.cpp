@@ -26,6 +26,7 @@ TEST(HashOfAll, tells_names_and_contents) {
   const test::TemporaryFolder one, other;
   write_file(one.path() / "a" / "weights", "12");
   write_file(other.path() / "a" / "weights", "12");
+  write_file(other.path() / "CARD.md", "about the weights");
   EXPECT_EQ(hash_of_all(one.path()), hash_of_all(other.path()));
   write_file(other.path() / "a" / "weights", "13");
   const std::string changed = hash_of_all(other.path());
