@@ -43,31 +43,18 @@ def biased_processor(biases):
 
 
 def add_bias(unet, grid, view, device):
+    """Biases the self-attention of every layer of `unet`; their resolution is told by the number of tokens."""
     from flex_attention import FlexBias, landings
 
-    tables = {level.pixels: (level, landings(level).to(device)) for level in levels(grid, view)}
-    biases = {}
-    for name, module in unet.named_modules():
-        if name.endswith("attn1"):
-            pixels = (grid * view >> level_of(name)) ** 2
-            if pixels not in biases:
-                level, table = tables[pixels]
-                biases[pixels] = FlexBias(level, table, WEIGHT)
-    processor = biased_processor(biases)
+    processor = biased_processor(
+        {level.pixels: FlexBias(level, landings(level).to(device), WEIGHT) for level in levels(grid, view)}
+    )
     unet.set_attn_processor(
         {
             name: processor if name.removesuffix(".processor").endswith("attn1") else original
             for name, original in unet.attn_processors.items()
         }
     )
-
-
-def level_of(name):
-    """Which resolution, 0 the finest, a self-attention works at."""
-    if name.startswith("mid_block"):
-        return 3
-    block = int(name.split(".")[1])
-    return block if name.startswith("down_blocks") else 3 - block
 
 
 def main():

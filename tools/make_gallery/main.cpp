@@ -52,7 +52,7 @@ constexpr Entry kEntries[] = {
     {"spot_terracotta", "Spot/spot_triangulated.obj", "a terracotta cow", 1.0f, 1, 5},
 };
 
-// Of the options that an edit is steered with, with the values of the paper's figures.
+// The options that an edit is steered with, from end to end of their useful range and beyond.
 const make_gallery::OptionSheet kSheets[] = {
     {"strength", {"0.2", "0.4", "0.6", "0.8", "0.9", "1"}},
     {"tile-scale", {"1", "0.8", "0.6", "0.4", "0.2", "0"}},
