@@ -11,8 +11,8 @@ DEMO_DIR := build/demo
 DEMO_MODEL ?= models/patina-mini
 DEMO_PROMPT ?= a rusty old kettle
 # The demo's main command, which leaves its results in folder $(1).
-demo_command = build/release/patina enhance examples/kettle.glb --prompt "$(DEMO_PROMPT)" --model $(DEMO_MODEL) \
-	  -o $(1)/kettle.glb
+demo_command = build/release/patina enhance examples/kettle.glb --prompt "$(DEMO_PROMPT)" --strength 0.9 \
+	  --model $(DEMO_MODEL) -o $(1)/kettle.glb
 MINI_MODEL ?= models/patina-mini
 MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "composer.h"
 #include "discriminant.h"
 
 namespace patina::bench {
@@ -16,12 +17,14 @@ struct Classifier {
   nlohmann::json trials;  // how good it is: see docs/measuring-mini.md
 };
 
-/// What the classifier depends on, and with it all that it judges.
-std::string classifier_key(const std::filesystem::path& shards);
+/// What the classifier depends on, and with it all that it judges: the data, and the autoencoder in the
+/// folder `vae`.
+std::string classifier_key(const std::filesystem::path& shards, const std::filesystem::path& vae);
 
-/// Trains on the data that make_dataset packed into `shards`, or reads what an earlier call kept in `folder`;
-/// leaves a sheet of the known edits there. Takes some minutes of one core the first time.
+/// Trains on the data that make_dataset packed into `shards`, or reads what an earlier call kept in `folder`
+/// under `key`; leaves sheets of the known edits there. Takes a quarter of an hour the first time.
 inline constexpr const char* kClassifierTrials = "classifier_trials";  // the kept part
-Classifier trained_classifier(const std::filesystem::path& shards, const std::filesystem::path& folder);
+Classifier trained_classifier(const std::filesystem::path& shards, const AsEditedView& as_edited_view,
+                              const std::filesystem::path& folder, const std::string& key);
 
 }  // namespace patina::bench

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -18,6 +19,10 @@ struct Composed {
   Image coverage;       // share of the pixel that the object fills
   Image age_mask;       // how much of the surface's colour the plan's layers made up
 };
+
+/// How the model that is judged would show what it painted: `after` through its autoencoder, with the fine
+/// detail of `before` that `patina enhance` gives back. All [H,W,3] sRGB in [0,1].
+using AsEditedView = std::function<Image(const Image& before, const Image& after)>;
 
 /// Objects of one part and materials of one part in memory, about 1.9 MB a view and 0.5 MB a material. Of the
 /// objects only those in nearly white light, as the product's studio is: under a red sky all is brick.

@@ -45,7 +45,7 @@ std::vector<int> photographs_of(const Catalog& catalog, const AskedClass& asked)
   return out;
 }
 
-// The photograph all over an object, nothing else.
+// The photograph all over an object that was of one paint.
 Plan photograph_plan(const Catalog& catalog, int material, uint64_t seed, uint64_t index) {
   Draw draw(seed, kDrawPlan, index);
   Catalog only;
@@ -58,7 +58,10 @@ Plan photograph_plan(const Catalog& catalog, int material, uint64_t seed, uint64
   plan.object = draw.below(static_cast<int>(catalog.objects.size()));
   plan.views = {
       draw.below(static_cast<int>(catalog.objects[static_cast<size_t>(plan.object)]->views.size()))};
-  plan.clean[0] = plan.clean[1] = photo(only, draw, material_class);
+  plan.remade = true;
+  plan.remade_of = photo(only, draw, material_class);
+  plan.clean[0].color = any_paint(draw);
+  plan.clean[1] = plan.clean[0];
   return plan;
 }
 
@@ -70,19 +73,27 @@ bool covers_all(const std::string& recipe) {
   return is_clean(recipe) || !age_recipe(recipe).remade_of.empty();
 }
 
-void add_windows(const Composed& picture, bool all_of_it, KnownWindow as, std::vector<KnownWindow>& out) {
+void add_windows(const Composed& picture, const AsEditedView& as_edited_view, bool all_of_it, KnownWindow as,
+                 std::vector<KnownWindow>& out) {
   constexpr float kLeastMade = 0.6f;
-  const TexturePlanes planes = texture_planes(picture.after, picture.coverage);
-  for (const Window& window : windows_on_object(planes, kWindowSide, kLeastValid)) {
-    if (!all_of_it && mean_over(planes, window, picture.age_mask.pixels) < kLeastMade) continue;
-    as.features = texture_features(planes, window);
-    out.push_back(as);
-  }
+  const auto add = [&](const Image& shown) {
+    const TexturePlanes planes = texture_planes(shown, picture.coverage);
+    for (const Window& window : windows_on_object(planes, kWindowSide, kLeastValid)) {
+      if (!all_of_it && mean_over(planes, window, picture.age_mask.pixels) < kLeastMade) continue;
+      as.features = texture_features(planes, window);
+      out.push_back(as);
+    }
+  };
+  add(picture.after);
+  if (!as_edited_view) return;
+  as.edited_view = true;
+  add(as_edited_view(picture.before, picture.after));
 }
 
 }  // namespace
 
-std::vector<KnownWindow> photograph_windows(const Composer& composer, int pictures_a_class, uint64_t seed) {
+std::vector<KnownWindow> photograph_windows(const Composer& composer, const AsEditedView& as_edited_view,
+                                            int pictures_a_class, uint64_t seed) {
   std::vector<KnownWindow> out;
   const Catalog& catalog = composer.catalog();
   const auto classes = all_classes();
@@ -95,14 +106,16 @@ std::vector<KnownWindow> photograph_windows(const Composer& composer, int pictur
                                       label * 1000 + static_cast<uint64_t>(i)));
     const std::vector<Composed> pictures = compose_all(composer, plans);
     for (size_t i = 0; i < pictures.size(); ++i) {
-      const auto& material = catalog.dataset->materials[static_cast<size_t>(plans[i].clean[0].material)];
-      add_windows(pictures[i], true, {{}, static_cast<int>(label), material.name, static_cast<int>(i)}, out);
+      const auto& material = catalog.dataset->materials[static_cast<size_t>(plans[i].remade_of.material)];
+      add_windows(pictures[i], as_edited_view, true,
+                  {{}, static_cast<int>(label), material.name, static_cast<int>(i)}, out);
     }
   }
   return out;
 }
 
-std::vector<KnownWindow> recipe_windows(const Composer& composer, int pictures_a_class, uint64_t seed) {
+std::vector<KnownWindow> recipe_windows(const Composer& composer, const AsEditedView& as_edited_view,
+                                        int pictures_a_class, uint64_t seed) {
   std::vector<KnownWindow> out;
   const auto classes = all_classes();
   for (size_t label = 0; label < classes.size(); ++label) {
@@ -114,8 +127,8 @@ std::vector<KnownWindow> recipe_windows(const Composer& composer, int pictures_a
     const std::vector<Composed> pictures = compose_all(composer, plans);
     for (size_t i = 0; i < pictures.size(); ++i) {
       const std::string& recipe = recipes[i % recipes.size()];
-      add_windows(pictures[i], covers_all(recipe), {{}, static_cast<int>(label), recipe, static_cast<int>(i)},
-                  out);
+      add_windows(pictures[i], as_edited_view, covers_all(recipe),
+                  {{}, static_cast<int>(label), recipe, static_cast<int>(i)}, out);
     }
   }
   return out;

@@ -135,13 +135,16 @@ void run(const Arguments& arguments) {
       parts[part] = *std::move(kept);
   };
 
-  const std::string materials_key = classifier_key(arguments.shards);
+  const std::string materials_key = classifier_key(arguments.shards, arguments.model / "vae");
   add("vae", key + materials_key, [&] {
     return measure_vae(load(), held_out_pictures(arguments, settings, assets, folder, model),
                        folder / "vae.png");
   });
   add("edits", key + materials_key, [&] {
-    const Classifier classifier = trained_classifier(arguments.shards, folder);
+    const AsEditedView shown = [&](const Image& before, const Image& after) {
+      return as_edited_view(load(), before, after);
+    };
+    const Classifier classifier = trained_classifier(arguments.shards, shown, folder, materials_key);
     return measure_edits(assets, settings, classifier.discriminant, folder / "edits", model);
   });
   if (std::optional<json> trials = kept_result(folder, kClassifierTrials, materials_key))
@@ -154,27 +157,29 @@ void run(const Arguments& arguments) {
   if (!arguments.demo.empty())
     add("demo", model_hash + arguments.demo, [&] { return timed_demo(arguments.demo); });
 
-  const json result = {{"patina", PATINA_VERSION},
-                       {"model", arguments.model.string()},
-                       {"model_hash", model_hash},
-                       {"vae_psnr", at_or_null(parts, "/vae/psnr")},
-                       {"vae_psnr_object", at_or_null(parts, "/vae/psnr_object")},
-                       {"obedience_top3", at_or_null(parts, "/edits/obedience/top3")},
-                       {"obedience_runs", at_or_null(parts, "/edits/obedience/runs")},
-                       {"obedience_classes", at_or_null(parts, "/edits/obedience/classes")},
-                       {"obedience_ceiling_top3", at_or_null(parts, "/classifier/truth/top3")},
-                       {"obedience_ceiling_top3_held_out_materials",
-                        at_or_null(parts, "/classifier/truth_with_held_out_materials/top3")},
-                       {"classifier_top1", at_or_null(parts, "/classifier/held_out_photographs/top1")},
-                       {"classifier_top3", at_or_null(parts, "/classifier/held_out_photographs/top3")},
-                       {"clean_prompt_psnr", at_or_null(parts, "/edits/clean/psnr")},
-                       {"edge_f_score", at_or_null(parts, "/edits/structure/edge_f_score")},
-                       {"silhouette_bleed", at_or_null(parts, "/edits/structure/silhouette_bleed")},
-                       {"consistency", at_or_null(parts, "/ablation/edit_correlation")},
-                       {"sharpness", at_or_null(parts, "/ablation/texture_sharpness")},
-                       {"sweep", at_or_null(parts, "/sweep")},
-                       {"demo_seconds", at_or_null(parts, "/demo/seconds")},
-                       {"parts", parts}};
+  const json result = {
+      {"patina", PATINA_VERSION},
+      {"model", arguments.model.string()},
+      {"model_hash", model_hash},
+      {"vae_psnr", at_or_null(parts, "/vae/psnr")},
+      {"vae_psnr_object", at_or_null(parts, "/vae/psnr_object")},
+      {"obedience_top3", at_or_null(parts, "/edits/obedience/top3")},
+      {"obedience_runs", at_or_null(parts, "/edits/obedience/runs")},
+      {"obedience_classes", at_or_null(parts, "/edits/obedience/classes")},
+      {"obedience_ceiling_top3", at_or_null(parts, "/classifier/truth/top3")},
+      {"obedience_ceiling_top3_held_out_materials",
+       at_or_null(parts, "/classifier/truth_with_held_out_materials/top3")},
+      {"obedience_ceiling_top3_as_rendered", at_or_null(parts, "/classifier/truth_as_rendered/top3")},
+      {"classifier_top1", at_or_null(parts, "/classifier/held_out_photographs/top1")},
+      {"classifier_top3", at_or_null(parts, "/classifier/held_out_photographs/top3")},
+      {"clean_prompt_psnr", at_or_null(parts, "/edits/clean/psnr")},
+      {"edge_f_score", at_or_null(parts, "/edits/structure/edge_f_score")},
+      {"silhouette_bleed", at_or_null(parts, "/edits/structure/silhouette_bleed")},
+      {"consistency", at_or_null(parts, "/ablation/edit_correlation")},
+      {"sharpness", at_or_null(parts, "/ablation/texture_sharpness")},
+      {"sweep", at_or_null(parts, "/sweep")},
+      {"demo_seconds", at_or_null(parts, "/demo/seconds")},
+      {"parts", parts}};
   write_file(arguments.out, result.dump(1));
   for (const auto& [name, value] : result.items())
     if (value.is_number() || value.is_array() || value.is_null())

@@ -15,6 +15,10 @@ namespace patina::bench {
 /// The mean of the encoder's posterior, decoded; [H,W,3] sRGB in [0,1], as the pipeline uses the autoencoder.
 Image vae_round_trip(const diffusion::Model& model, const Image& srgb);
 
+/// `after` as an edited view shows it: the same, with the fine detail of `before` that the detail stage gives
+/// back by default.
+Image as_edited_view(const diffusion::Model& model, const Image& before, const Image& after);
+
 struct MaskedPicture {
   Image srgb;      // [H,W,3]
   Image coverage;  // [H,W,1], the object

@@ -35,7 +35,7 @@ struct Entry {
 };
 
 constexpr Entry kEntries[] = {
-    {"kettle_rust", "examples/kettle.glb", "a rusty old kettle", 1.0f, 1, 5},
+    {"kettle_rust", "examples/kettle.glb", "a rusty old kettle", 0.9f, 1, 5},
     {"kettle_moss", "examples/kettle.glb", "a kettle covered in moss", 1.0f, 1, 5},
     {"kettle_scratches", "examples/kettle.glb", "a slightly scratched kettle", 0.6f, 1, 5},
     {"kettle_copper", "examples/kettle.glb", "a kettle of green copper patina", 1.0f, 1, 5},
