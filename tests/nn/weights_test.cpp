@@ -96,7 +96,8 @@ TEST_F(Weights, refuses_tensors_that_nobody_asked_for_unless_they_are_known) {
             std::string::npos);
   reader.ignore("ids");
   EXPECT_EQ(finish_message(reader), "fits");
-  EXPECT_EQ(reader.num_parameters(), 9);
+  EXPECT_EQ(reader.count().parameters, 9);
+  EXPECT_EQ(reader.count().bytes, 36);
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ ControlNet::ControlNet(const ControlNetConfig& config, nn::WeightReader& weights
   }
   controlnet_mid_block_ =
       nn::load_conv2d(weights, "controlnet_mid_block", channels.back(), channels.back(), 1);
-  num_parameters_ = weights.num_parameters();
+  count_ = weights.count();
 }
 
 ControlNet::ControlNet(const std::filesystem::path& folder, at::ScalarType type)

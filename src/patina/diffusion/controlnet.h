@@ -33,11 +33,12 @@ class ControlNet {
                               const nn::SelfAttentionBias* bias = nullptr) const;
 
   const ControlNetConfig& config() const { return config_; }
-  int64_t num_parameters() const { return num_parameters_; }
+  int64_t num_parameters() const { return count_.parameters; }
+  int64_t num_bytes() const { return count_.bytes; }
 
  private:
   at::ScalarType type_;
-  int64_t num_parameters_ = 0;
+  nn::WeightCount count_;
   ControlNetConfig config_;
   Encoder encoder_;
   ConditionEmbedding condition_embedding_;

@@ -32,7 +32,7 @@ int64_t check_tensors(const NetworkPart<Config>& part) {
   nn::WeightReader weights(source, c10::ScalarType::Float);
   Network network(part.config, weights);
   weights.finish();
-  return weights.num_parameters();
+  return weights.count().parameters;
 }
 
 /// Answers every question with the shape that is asked for, and notes it.

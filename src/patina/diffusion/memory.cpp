@@ -26,13 +26,14 @@ DetailMemory predict_memory(const Model& model, int grid, int view_width, int vi
                             const DetailOptions& options) {
   const Model::State& networks = model.state();
   const int64_t bytes = networks.dtype == Dtype::kF32 ? 4 : 2;
-  const int64_t text = networks.text_encoder.num_parameters() * bytes,
-                vae = networks.vae.num_parameters() * bytes,
-                tile = networks.controlnet_tile.num_parameters() * bytes,
-                normal = networks.controlnet_normal.num_parameters() * bytes;
+  const auto bytes_of = [&](const auto& held) {
+    return held.is_resident() ? held.use()->num_bytes() : held.num_parameters() * bytes;
+  };
+  const int64_t text = bytes_of(networks.text_encoder), vae = bytes_of(networks.vae),
+                tile = bytes_of(networks.controlnet_tile), normal = bytes_of(networks.controlnet_normal);
   DetailMemory memory;
   const int64_t weights =
-      networks.unet.num_parameters() * bytes +
+      networks.unet.num_bytes() +
       (networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal}));
   memory.weights =
       kLibraryBytes + weights + static_cast<int64_t>(kKeptFromConverting * static_cast<double>(weights));

@@ -107,7 +107,8 @@ Model::Model(const ModelPaths& paths, const ModelOptions& options) {
   const ModelParts parts = find_model_parts(paths);
   const Device device = resolve(options.device);
   const Dtype dtype = resolve(options.dtype, device, parts.unet.table);
-  const nn::Placement placement{scalar_type(dtype), device == Device::kCuda ? c10::kCUDA : c10::kCPU};
+  const nn::Placement placement{scalar_type(dtype), device == Device::kCuda ? c10::kCUDA : c10::kCPU,
+                                options.low_memory};
   const bool resident = !options.low_memory;
   state_ = std::unique_ptr<State>(
       new State{dtype, device, Tokenizer(parts.tokenizer, parts.pad_id),

@@ -70,7 +70,7 @@ TextEncoder::TextEncoder(const TextEncoderConfig& config, nn::WeightReader& weig
                            "vision_model.", "visual_projection"}) {
     weights.ignore(name);
   }
-  num_parameters_ = weights.num_parameters();
+  count_ = weights.count();
 }
 
 TextEncoder::TextEncoder(const std::filesystem::path& folder, at::ScalarType type)

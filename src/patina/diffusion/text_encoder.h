@@ -55,11 +55,12 @@ class TextEncoder {
                           const at::Tensor& learned = {}) const;
 
   const TextEncoderConfig& config() const { return config_; }
-  int64_t num_parameters() const { return num_parameters_; }
+  int64_t num_parameters() const { return count_.parameters; }
+  int64_t num_bytes() const { return count_.bytes; }
 
  private:
   TextEncoderConfig config_;
-  int64_t num_parameters_ = 0;
+  nn::WeightCount count_;
   at::Tensor token_embedding_;     // [V,D]
   at::Tensor position_embedding_;  // [P,D]
   std::vector<TextLayer> layers_;

@@ -152,7 +152,7 @@ UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.
   conv_norm_out_ =
       nn::load_group_norm(weights, "conv_norm_out", finest, config.norm_num_groups, config.norm_epsilon);
   conv_out_ = nn::load_conv2d(weights, "conv_out", finest, config.out_channels, config.conv_out_kernel);
-  num_parameters_ = weights.num_parameters();
+  count_ = weights.count();
 }
 
 UNet::UNet(const std::filesystem::path& folder, at::ScalarType type)

@@ -88,12 +88,13 @@ class UNet {
   at::Tensor operator()(UNetInputs inputs, const nn::Recorder& record = {}) const;
 
   const UNetConfig& config() const { return encoder_.config; }
-  int64_t num_parameters() const { return num_parameters_; }
+  int64_t num_parameters() const { return count_.parameters; }
+  int64_t num_bytes() const { return count_.bytes; }
   at::ScalarType type() const { return type_; }
 
  private:
   at::ScalarType type_;
-  int64_t num_parameters_ = 0;
+  nn::WeightCount count_;
   Encoder encoder_;
   std::vector<UpBlock> up_blocks_;
   nn::GroupNorm conv_norm_out_;

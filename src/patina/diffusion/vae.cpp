@@ -128,7 +128,7 @@ Vae::Vae(const VaeConfig& config, nn::WeightReader& weights) : type_(weights.typ
   if (config_.post_quant_conv)
     post_quant_conv_ = nn::load_conv2d(weights, "post_quant_conv", latent, latent, 1);
   decoder_ = load_vae_decoder(weights, config_);
-  num_parameters_ = weights.num_parameters();
+  count_ = weights.count();
 }
 
 Vae::Vae(const std::filesystem::path& folder, at::ScalarType type)

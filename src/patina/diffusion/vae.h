@@ -72,11 +72,12 @@ class Vae {
   at::Tensor decode(const at::Tensor& latents, const nn::Recorder& record = {}) const;
 
   const VaeConfig& config() const { return config_; }
-  int64_t num_parameters() const { return num_parameters_; }
+  int64_t num_parameters() const { return count_.parameters; }
+  int64_t num_bytes() const { return count_.bytes; }
 
  private:
   at::ScalarType type_;
-  int64_t num_parameters_ = 0;
+  nn::WeightCount count_;
   VaeConfig config_;
   VaeEncoder encoder_;
   std::optional<nn::Conv2d> quant_conv_, post_quant_conv_;

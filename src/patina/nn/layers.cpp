@@ -4,6 +4,7 @@
 #include <c10/core/GradMode.h>
 #include <torch/version.h>
 
+#include "patina/base/check.h"
 #include "patina/nn/pointwise.h"
 
 namespace patina::nn {
@@ -13,7 +14,14 @@ at::Tensor Linear::operator()(const at::Tensor& x, const Recorder& record) const
 }
 
 at::Tensor Conv2d::operator()(const at::Tensor& x, const Recorder& record) const {
-  return record(name, at::conv2d(x, weight, bias, stride, padding));
+  if (!winograd) return record(name, at::conv2d(x, weight, bias, stride, padding));
+  PATINA_CHECK(x.dim() == 4 && x.size(1) == winograd->in() && x.scalar_type() == at::kBFloat16 && x.is_cpu());
+  const at::Tensor image = x.contiguous(at::MemoryFormat::ChannelsLast);
+  const at::Tensor y = at::empty({x.size(0), winograd->out(), x.size(2), x.size(3)},
+                                 x.options().memory_format(at::MemoryFormat::ChannelsLast));
+  (*winograd)(static_cast<const Bf16*>(image.data_ptr()), static_cast<Bf16*>(y.data_ptr()), x.size(0),
+              x.size(2), x.size(3));
+  return record(name, y);
 }
 
 namespace {
@@ -22,6 +30,12 @@ namespace {
 bool suits_kernels(const at::Tensor& x) {
   return !c10::GradMode::is_enabled() && x.is_cpu() &&
          (x.scalar_type() == at::kFloat || x.scalar_type() == at::kBFloat16);
+}
+
+/// The same of weights.
+bool suits_winograd(const at::Tensor& weight) {
+  return weight.is_cpu() && weight.scalar_type() == at::kBFloat16 && !weight.requires_grad() &&
+         winograd_pays();
 }
 
 /// f(T*, T*) with the numbers of `x` and `y` as their type.
@@ -119,10 +133,22 @@ Linear load_linear_1x1(WeightReader& weights, const std::string& name, int64_t i
 Conv2d load_conv2d(WeightReader& weights, const std::string& name, int64_t in, int64_t out, int64_t kernel,
                    int64_t stride) {
   // Channels-last once here: oneDNN would else reorder the weight at every call.
-  return {
+  Conv2d layer{
       name,
       weights.take(name + ".weight", {out, in, kernel, kernel}).contiguous(at::MemoryFormat::ChannelsLast),
-      weights.take(name + ".bias", {out}), stride, kernel / 2};
+      weights.take(name + ".bias", {out}),
+      stride,
+      kernel / 2,
+      nullptr};
+  if (kernel == 3 && stride == 1 && !weights.low_memory() && suits_winograd(layer.weight) &&
+      Winograd::takes(in, out)) {
+    layer.winograd =
+        std::make_shared<const Winograd>(static_cast<const Bf16*>(layer.weight.data_ptr()),
+                                         static_cast<const Bf16*>(layer.bias.data_ptr()), in, out);
+    weights.add_bytes(layer.winograd->num_bytes() - static_cast<int64_t>(layer.weight.nbytes()));
+    layer.weight.reset(), layer.bias.reset();
+  }
+  return layer;
 }
 
 GroupNorm load_group_norm(WeightReader& weights, const std::string& name, int64_t channels,

@@ -2,12 +2,14 @@
 // layer's name is the path of its weights, under which it reports its output to the recorder.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include <ATen/core/Tensor.h>
 
 #include "patina/nn/recorder.h"
 #include "patina/nn/weights.h"
+#include "patina/nn/winograd.h"
 
 namespace patina::nn {
 
@@ -23,9 +25,10 @@ struct Linear {
 /// Cross-correlation of [B,C,H,W], channels-last in and out.
 struct Conv2d {
   std::string name;
-  at::Tensor weight;  // [out, in, k, k] channels-last
+  at::Tensor weight;  // [out, in, k, k] channels-last; undefined where `winograd` stands for it
   at::Tensor bias;    // [out]
   int64_t stride = 1, padding = 0;
+  std::shared_ptr<const Winograd> winograd;  // null: LibTorch's convolution
 
   at::Tensor operator()(const at::Tensor& x, const Recorder& record) const;
 };

@@ -96,7 +96,8 @@ at::Tensor WeightReader::take(const std::string& name, std::vector<int64_t> shap
                          shape_text(tensor.sizes()) + ")");
     return at::zeros(shape, type);
   }
-  num_parameters_ += tensor.numel();
+  count_.parameters += tensor.numel();
+  count_.bytes += static_cast<int64_t>(tensor.nbytes());
   return placement_.device.is_cpu() ? tensor : tensor.to(placement_.device);
 }
 

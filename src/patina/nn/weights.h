@@ -51,8 +51,17 @@ class FileWeights final : public WeightSource {
 struct Placement {
   at::ScalarType type;
   c10::Device device;
+  /// Weights are kept in no form that is faster and larger.
+  bool low_memory;
 
-  Placement(at::ScalarType t, c10::Device d = c10::kCPU) : type(t), device(d) {}
+  Placement(at::ScalarType t, c10::Device d = c10::kCPU, bool low = false)
+      : type(t), device(d), low_memory(low) {}
+};
+
+/// How large a network is.
+struct WeightCount {
+  int64_t parameters = 0;
+  int64_t bytes = 0;  // in memory
 };
 
 /// Hands out the tensors of one network and keeps account of what does not fit.
@@ -71,7 +80,11 @@ class WeightReader {
   at::Tensor take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type);
   bool has(const std::string& name) const { return source_.has(name); }
   at::ScalarType type() const { return placement_.type; }
-  int64_t num_parameters() const { return num_parameters_; }
+  bool low_memory() const { return placement_.low_memory; }
+  /// Of all that was taken.
+  const WeightCount& count() const { return count_; }
+  /// A layer keeps what it took in a form that is larger by so many bytes.
+  void add_bytes(int64_t bytes) { count_.bytes += bytes; }
 
   /// Names that begin so may be in the file unused (position ids, training leftovers).
   void ignore(std::string prefix) { ignored_.push_back(std::move(prefix)); }
@@ -82,7 +95,7 @@ class WeightReader {
  private:
   WeightSource& source_;
   Placement placement_;
-  int64_t num_parameters_ = 0;
+  WeightCount count_;
   std::vector<std::string> taken_, ignored_, missing_, misshapen_;
 };
 
