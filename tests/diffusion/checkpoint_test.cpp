@@ -113,14 +113,20 @@ TEST_P(Checkpoint, half_mixed_and_sharded_weights_give_the_same_picture_to_the_b
   expect_same(run(single, Dtype::kBf16), run(with_tokenizer({file("sharded"), {}, {}, {}}), Dtype::kBf16));
 }
 
-TEST_P(Checkpoint, networks_that_are_read_for_each_use_give_the_same_picture_to_the_bit) {
+TEST_P(Checkpoint, networks_that_are_read_for_each_use_give_the_same_picture) {
   // As stored, so that the tensors lie in the file, and converted; with LoRAs of both networks.
   const make::Model model = small_model(GetParam(), ElementType::kBF16);
   ModelPaths paths = write_single("single.safetensors", model);
   make::write_lora(file("lora.safetensors"), model);
   paths.loras = {{file("lora.safetensors"), 0.7f}};
-  for (const Dtype dtype : {Dtype::kBf16, Dtype::kF32})
-    expect_same(run(paths, dtype, /*low_memory=*/true), run(paths, dtype));
+  const auto pictures = [&](Dtype dtype, bool low_memory) { return run(paths, dtype, low_memory); };
+  expect_same(pictures(Dtype::kF32, true), pictures(Dtype::kF32, false));
+  // With low memory convolutions are plain sums, with enough of it Winograd's: in bf16 they round
+  // differently.
+  const std::vector<Image> low = pictures(Dtype::kBf16, true), enough = pictures(Dtype::kBf16, false);
+  for (size_t i = 0; i < low.size(); ++i)
+    for (size_t p = 0; p < low[i].pixels.size(); ++p)
+      ASSERT_NEAR(low[i].pixels[p], enough[i].pixels[p], 0.05) << "picture " << i << ", number " << p;
 }
 
 INSTANTIATE_TEST_SUITE_P(Families, Checkpoint, testing::Values(Family::kSd1, Family::kSd2),
