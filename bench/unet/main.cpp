@@ -3,11 +3,9 @@
 //
 //   bench_unet [--out build/bench/unet.json] [--size 512] [--grid 1] [--threads N] [--f32] [--repeat 5]
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <functional>
 #include <string>
 
 #include <ATen/ATen.h>
@@ -15,6 +13,8 @@
 #include <c10/core/InferenceMode.h>
 #include <nlohmann/json.hpp>
 
+#include "best_seconds.h"
+#include "convolutions.h"
 #include "make_checkpoint/configs.h"
 #include "operation_times.h"
 #include "patina/base/files.h"
@@ -28,17 +28,8 @@
 namespace {
 
 using namespace patina;
+using bench::best_seconds;
 using bench::RandomWeights;
-
-double best_seconds(int repeat, const std::function<void()>& work) {
-  double best = 1e30;
-  for (int i = 0; i < repeat; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  }
-  return best;
-}
 
 /// GFLOP/s of LibTorch's product of two square matrices, all threads.
 double matrix_peak(at::ScalarType type, int repeat) {
@@ -121,6 +112,20 @@ nlohmann::json measure(const Options& options) {
   for (const auto& [name, share] : bench::operation_seconds(decode)) result["vae_operations"][name] = share;
 
   result["peak_mb"] = static_cast<double>(peak_resident_bytes()) / 1048576;
+
+  // With plain sums in place of Winograd's convolutions, as --low-memory has them.
+  if (nn::winograd_pays() && options.type == at::kBFloat16) {
+    const nn::Placement plain(options.type, c10::kCPU, /*low=*/true);
+    nn::WeightReader plain_unet_reader(unet_weights, plain), plain_vae_reader(vae_weights, plain);
+    const diffusion::UNet plain_unet(configs.unet, plain_unet_reader);
+    const diffusion::Vae plain_vae(configs.vae, plain_vae_reader);
+    result["unet_" + size + "_plain_seconds"] = best_seconds(options.repeat, [&] {
+      plain_unet({sample, time, text});
+    });
+    result["vae_decode_" + std::to_string(options.side) + "_plain_seconds"] =
+        best_seconds(std::max(1, options.repeat / 2), [&] { plain_vae.decode(view); });
+    result["convolutions"] = bench::measure_convolutions(options.repeat);
+  }
 
   // Guidance evaluates two prompts: as one batch?
   const at::Tensor two_samples = sample.expand({2, -1, -1, -1}), two_texts = text.expand({2, -1, -1});

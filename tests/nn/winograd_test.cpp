@@ -36,7 +36,7 @@ struct Problem {
     };
     const auto last = at::MemoryFormat::ChannelsLast;
     x = numbers({b, i, h, w}, 1).contiguous(last);
-    weight = numbers({o, i, 3, 3}, 1 / std::sqrt(9.0 * static_cast<double>(i))).contiguous(last);
+    weight = numbers({o, i, 3, 3}, 1 / std::sqrt(9.0 * static_cast<double>(i)));
     bias = numbers({o}, 1);
   }
   at::Tensor plain() const {

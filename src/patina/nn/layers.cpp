@@ -132,21 +132,23 @@ Linear load_linear_1x1(WeightReader& weights, const std::string& name, int64_t i
 
 Conv2d load_conv2d(WeightReader& weights, const std::string& name, int64_t in, int64_t out, int64_t kernel,
                    int64_t stride) {
-  // Channels-last once here: oneDNN would else reorder the weight at every call.
-  Conv2d layer{
-      name,
-      weights.take(name + ".weight", {out, in, kernel, kernel}).contiguous(at::MemoryFormat::ChannelsLast),
-      weights.take(name + ".bias", {out}),
-      stride,
-      kernel / 2,
-      nullptr};
-  if (kernel == 3 && stride == 1 && !weights.low_memory() && suits_winograd(layer.weight) &&
-      Winograd::takes(in, out)) {
+  Conv2d layer{name,
+               weights.take(name + ".weight", {out, in, kernel, kernel}),
+               weights.take(name + ".bias", {out}),
+               stride,
+               kernel / 2,
+               nullptr};
+  const bool fits = kernel == 3 && stride == 1 && Winograd::takes(in, out);
+  if (fits && suits_winograd(layer.weight) && !weights.low_memory()) {
+    const at::Tensor weight = layer.weight.contiguous();
     layer.winograd =
-        std::make_shared<const Winograd>(static_cast<const Bf16*>(layer.weight.data_ptr()),
+        std::make_shared<const Winograd>(static_cast<const Bf16*>(weight.data_ptr()),
                                          static_cast<const Bf16*>(layer.bias.data_ptr()), in, out);
-    weights.add_bytes(layer.winograd->num_bytes() - static_cast<int64_t>(layer.weight.nbytes()));
+    weights.add_bytes(layer.winograd->num_bytes() - static_cast<int64_t>(weight.nbytes()));
     layer.weight.reset(), layer.bias.reset();
+  } else {
+    // Channels-last once here: oneDNN would else reorder the weight at every call.
+    layer.weight = layer.weight.contiguous(at::MemoryFormat::ChannelsLast);
   }
   return layer;
 }

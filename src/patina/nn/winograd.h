@@ -15,7 +15,7 @@ bool winograd_pays();
 /// The weights of one layer, transformed: 16/9 of their size before.
 class Winograd {
  public:
-  /// `weight` [out, 3, 3, in], `bias` [out]. `in` is a multiple of 32, `out` of 16.
+  /// `weight` [out, in, 3, 3], `bias` [out]. `in` is a multiple of 32, `out` of 16.
   Winograd(const Bf16* weight, const Bf16* bias, int64_t in, int64_t out);
 
   static bool takes(int64_t in, int64_t out) { return in % 32 == 0 && out % 16 == 0; }

@@ -12,8 +12,8 @@ PATINA_INLINE __m512 load16(const Bf16* from) {
   return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(bits), 16));
 }
 
-PATINA_INLINE void store16(__m512 values, Bf16* to) {
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), reinterpret_cast<__m256i>(_mm512_cvtneps_pbh(values)));
+PATINA_INLINE void store16(__m512 values, void* to) {
+  _mm256_storeu_si256(static_cast<__m256i*>(to), reinterpret_cast<__m256i>(_mm512_cvtneps_pbh(values)));
 }
 
 /// One axis of Bᵀ d B.
@@ -56,7 +56,7 @@ void multiply_columns(const uint32_t* v, const uint32_t* u, int64_t count, int64
 
 }  // namespace
 
-void transform_input(const Bf16* x, const Tiles& tiles, int64_t channels, Bf16* v) {
+void transform_input(const Bf16* x, const Tiles& tiles, int64_t channels, uint32_t* v) {
   const int64_t across = (tiles.width + 1) / 2;
   for (int64_t t = 0; t < tiles.count; ++t) {
     const int64_t top = (tiles.first + t) / across * 2 - 1, left = (tiles.first + t) % across * 2 - 1;
@@ -71,7 +71,7 @@ void transform_input(const Bf16* x, const Tiles& tiles, int64_t channels, Bf16* 
       for (int i = 0; i < 16; ++i) d[i] = pixels[i] ? load16(pixels[i] + c) : _mm512_setzero_ps();
       for (int i = 0; i < 4; ++i) transform4(d[i], d[4 + i], d[8 + i], d[12 + i]);
       for (int i = 0; i < 16; i += 4) transform4(d[i], d[i + 1], d[i + 2], d[i + 3]);
-      for (int i = 0; i < 16; ++i) store16(d[i], v + (i * tiles.count + t) * channels + c);
+      for (int i = 0; i < 16; ++i) store16(d[i], v + ((i * tiles.count + t) * channels + c) / 2);
     }
   }
 }

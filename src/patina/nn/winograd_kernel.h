@@ -20,8 +20,8 @@ struct Tiles {
   int64_t height, width;  // of the image, pixels
 };
 
-/// x [height, width, channels] -> v [16, count, channels].
-void transform_input(const Bf16* x, const Tiles& tiles, int64_t channels, Bf16* v);
+/// x [height, width, channels] -> v [16, count, channels], in pairs.
+void transform_input(const Bf16* x, const Tiles& tiles, int64_t channels, uint32_t* v);
 
 /// m [16, count, kPanel] = Σ over pairs of v [16, count, pairs] · u [16, pairs, kPanel], of the first
 /// `out` columns, a multiple of 16.
