@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "patina/attention/bf16.h"
+#include "patina/base/bf16.h"
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
 #include "problem.h"

@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "patina/attention/bf16.h"
+#include "patina/base/bf16.h"
 #include "patina/attention/cuda/merge_block.h"
 
 namespace patina::attention::test {

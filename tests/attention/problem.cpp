@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "patina/attention/bf16.h"
+#include "patina/base/bf16.h"
 #include "patina/base/random.h"
 
 namespace patina::attention::test {

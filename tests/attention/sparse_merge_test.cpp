@@ -10,7 +10,7 @@
 
 #include "emulated_gpu.h"
 #include "merge_problem.h"
-#include "patina/attention/bf16.h"
+#include "patina/base/bf16.h"
 #include "patina/base/error.h"
 
 namespace patina::attention::test {

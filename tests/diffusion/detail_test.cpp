@@ -302,9 +302,7 @@ TEST(Detail, bf16_stays_near_f32) {
   for (const float guidance_scale : {1.0f, 7.5f}) {
     options.guidance_scale = guidance_scale;
     const Image f32 = run(inputs, options)[0], bf16 = generate_detail(model, inputs, options, {}, {})[0];
-    double squares = 0;
-    for (size_t i = 0; i < f32.pixels.size(); ++i) squares += std::pow(f32.pixels[i] - bf16.pixels[i], 2);
-    const double psnr = -10 * std::log10(squares / static_cast<double>(f32.pixels.size()));
+    const double psnr = test::psnr(f32, bf16);
     RecordProperty("psnr_at_guidance_" + std::to_string(static_cast<int>(guidance_scale)),
                    std::to_string(psnr));
     EXPECT_GT(psnr, 35) << "guidance " << guidance_scale;

@@ -20,6 +20,13 @@ inline const Model& tiny_model() {
   return model;
 }
 
+/// Of two pictures of one size, dB.
+inline double psnr(const Image& a, const Image& b) {
+  double squares = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) squares += std::pow(a.pixels[i] - b.pixels[i], 2);
+  return -10 * std::log10(squares / static_cast<double>(a.pixels.size()));
+}
+
 /// Smooth views of `size`² pixels that differ from one another, and noise for them.
 inline DetailInputs made_inputs(int grid, int size) {
   DetailInputs inputs;

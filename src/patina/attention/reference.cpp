@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "patina/attention/attention.h"
-#include "patina/attention/bf16.h"
+#include "patina/base/bf16.h"
 
 namespace patina::attention {
 namespace {

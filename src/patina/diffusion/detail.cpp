@@ -15,14 +15,6 @@
 namespace patina::diffusion {
 namespace {
 
-Image image_from_tensor(const at::Tensor& tensor) {
-  const at::Tensor pixels = tensor.permute({0, 2, 3, 1}).contiguous();
-  Image image(static_cast<int>(pixels.size(2)), static_cast<int>(pixels.size(1)),
-              static_cast<int>(pixels.size(3)));
-  std::copy_n(pixels.data_ptr<float>(), image.pixels.size(), image.pixels.begin());
-  return image;
-}
-
 /// sRGB views in [0,1] from the grid's latents, and `share` of what the VAE loses of the renders.
 std::vector<Image> decode_views(const Vae& vae, std::vector<float>& latents, const GridSizes& sizes,
                                 const std::vector<Image>& renders, float share, const Progress& progress) {

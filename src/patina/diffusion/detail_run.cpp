@@ -133,6 +133,14 @@ at::Tensor tensor_from_image(const Image& image) {
   return pixels.permute({0, 3, 1, 2}).clone();
 }
 
+Image image_from_tensor(const at::Tensor& tensor) {
+  const at::Tensor pixels = tensor.permute({0, 2, 3, 1}).contiguous();
+  Image image(static_cast<int>(pixels.size(2)), static_cast<int>(pixels.size(1)),
+              static_cast<int>(pixels.size(3)));
+  std::copy_n(pixels.data_ptr<float>(), image.pixels.size(), image.pixels.begin());
+  return image;
+}
+
 Guidance guidance_of(const Model& model, const DetailOptions& options) {
   const Guidance& defaults = model.state().guidance;
   Guidance guidance{options.guidance_scale == kAutoGuidanceScale ? defaults.scale : options.guidance_scale,

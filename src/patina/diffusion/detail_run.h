@@ -42,6 +42,8 @@ std::unique_ptr<DetailRun> start_detail(const Model& model, const DetailInputs& 
 
 /// [1,3,H,W] f32 from an image, values as they are.
 at::Tensor tensor_from_image(const Image& image);
+/// The image of a [1,C,H,W] f32 tensor.
+Image image_from_tensor(const at::Tensor& tensor);
 
 /// Whether guidance evaluates both prompts at once for a grid of so many latent pixels: where that is faster,
 /// or as fast and takes little memory. By size alone: how much memory is free does not change the result.

@@ -32,7 +32,7 @@ bool suits_kernels(const at::Tensor& x) {
          (x.scalar_type() == at::kFloat || x.scalar_type() == at::kBFloat16);
 }
 
-/// The same of weights.
+/// Whether a convolution with this weight can be Winograd's, which records no gradients either.
 bool suits_winograd(const at::Tensor& weight) {
   return weight.is_cpu() && weight.scalar_type() == at::kBFloat16 && !weight.requires_grad() &&
          winograd_pays();

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "patina/attention/attention.h"
+#include "patina/base/bf16.h"
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
 #include "patina/nn/winograd_kernel.h"
@@ -13,10 +14,7 @@ namespace {
 
 using namespace winograd;
 
-float float_of(Bf16 x) {
-  return std::bit_cast<float>(static_cast<uint32_t>(x.bits) << 16);
-}
-// To the nearest, ties to even; weights are finite.
+// As bf16_of_float of what is finite: without its branch, so that compilers make vectors of it.
 uint32_t bits_of(float value) {
   const auto bits = std::bit_cast<uint32_t>(value);
   return (bits + 0x7FFFu + ((bits >> 16) & 1u)) >> 16;
@@ -59,7 +57,7 @@ Winograd::Winograd(const Bf16* weight, const Bf16* bias, int64_t in, int64_t out
   const int64_t pairs = in / 2, panels = panels_of(out);
   pairs_ = std::make_unique_for_overwrite<uint32_t[]>(static_cast<size_t>(num_bytes()) / sizeof(uint32_t));
   bias_ = std::make_unique<float[]>(static_cast<size_t>(out));
-  for (int64_t o = 0; o < out; ++o) bias_[static_cast<size_t>(o)] = float_of(bias[o]);
+  for (int64_t o = 0; o < out; ++o) bias_[static_cast<size_t>(o)] = float_of_bf16(bias[o].bits);
 
   // Two input channels of a panel's output channels at a time: what is written lies together.
   parallel_for(0, panels * pairs, 16, [&](int64_t begin, int64_t end) {
@@ -69,7 +67,7 @@ Winograd::Winograd(const Bf16* weight, const Bf16* bias, int64_t in, int64_t out
       for (int64_t i = 0; i < 2; ++i) {
         for (int64_t o = 0; o < std::min<int64_t>(kPanel, out - first); ++o)
           for (int64_t k = 0; k < 9; ++k)
-            g[k][o] = float_of(weight[((first + o) * in + 2 * pair + i) * 9 + k]);
+            g[k][o] = float_of_bf16(weight[((first + o) * in + 2 * pair + i) * 9 + k].bits);
         for (int column = 0; column < 3; ++column) transform3(g + column, 3, half + column, 3);
         for (int row = 0; row < 4; ++row) transform3(half + 3 * row, 1, u[i] + 4 * row, 1);
       }

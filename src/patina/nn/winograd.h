@@ -24,7 +24,7 @@ class Winograd {
   int64_t num_bytes() const;
 
   /// Cross-correlation with zeros around: x [batch, height, width, in] -> y [batch, height, width, out].
-  /// Transformed tiles are rounded to bf16, sums are f32: about three times the error of plain sums.
+  /// Transformed tiles are rounded to bf16, sums are f32: about twice the error of plain sums.
   void operator()(const Bf16* x, Bf16* y, int64_t batch, int64_t height, int64_t width) const;
 
  private:

@@ -234,7 +234,8 @@ std::vector<Option> make_options() {
        .aliases = {},
        .group = model,
        .placeholder = "",
-       .help = "Keep only the U-Net in memory and read text encoder, ControlNets and VAE anew for each use."},
+       .help = "Keep only the U-Net in memory, with its weights in their smallest form, and read text "
+               "encoder, ControlNets and VAE anew for each use."},
       [](Config & c) -> auto& { return c.low_memory; }));
 
   add(views_option());

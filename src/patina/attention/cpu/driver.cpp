@@ -11,7 +11,7 @@
 #include <memory>
 #include <numbers>
 
-#include "patina/attention/bf16.h"
+#include "patina/base/bf16.h"
 #include "patina/attention/cpu/kernel.h"
 #include "patina/attention/cpu/transpose.h"
 #include "patina/attention/query_blocks.h"

@@ -1,10 +1,10 @@
-// bfloat16 as its upper sixteen bits of an f32; conversion rounds to nearest even. Private to attention.
+// bfloat16 as its upper sixteen bits of an f32; conversion rounds to nearest even.
 #pragma once
 
 #include <bit>
 #include <cstdint>
 
-namespace patina::attention {
+namespace patina {
 
 inline float float_of_bf16(uint16_t bits) {
   return std::bit_cast<float>(static_cast<uint32_t>(bits) << 16);
@@ -17,4 +17,4 @@ inline uint16_t bf16_of_float(float value) {
   return static_cast<uint16_t>((bits + 0x7fffu + ((bits >> 16) & 1u)) >> 16);
 }
 
-}  // namespace patina::attention
+}  // namespace patina
