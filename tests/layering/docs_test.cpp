@@ -1,4 +1,5 @@
-// What can be checked of the documentation without understanding it: width of lines, links, names of files.
+// What can be checked of the documentation without understanding it: width of lines, links, names of files
+// and of options.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -140,6 +141,19 @@ bool exists_somewhere(const fs::path& page, const std::string& name) {
   return name.find('/') == std::string::npos && file_names().count(name) > 0;
 }
 
+// All sources of programs and scripts, one after another.
+std::string program_sources() {
+  std::string text;
+  for (const char* folder : {"apps", "bench", "mini", "scripts", "src", "tools"})
+    if (fs::exists(kRoot / folder))
+      for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
+        const fs::path extension = entry.path().extension();
+        if (extension == ".cpp" || extension == ".h" || extension == ".py" || extension == ".sh")
+          text += read_text_file(entry.path());
+      }
+  return text;
+}
+
 TEST(Docs, lines_have_at_most_100_columns) {
   int num_checked = 0;
   for (const Page& page : all_pages())
@@ -192,6 +206,31 @@ TEST(Docs, files_named_in_backticks_exist) {
     }
   }
   EXPECT_GT(num_checked, 30) << "the scan found too little to mean anything";
+}
+
+// An option that was renamed or removed leaves the pages at once. Values and meanings are not checked.
+TEST(Docs, options_named_exist) {
+  static const std::regex option(R"(--[a-z][a-z0-9_-]+)");
+  static const std::set<std::string> of_other_tools{"--build",    "--gtest_filter", "--help",
+                                                    "--parallel", "--preset",       "--target"};
+  const std::string sources = program_sources();
+  std::set<std::string> known = of_other_tools;
+  int num_checked = 0;
+  for (const Page& page : all_pages()) {
+    if (page.is_history()) continue;
+    for (const Line& line : page.lines)
+      for (std::sregex_iterator it(line.text.begin(), line.text.end(), option), end; it != end; ++it) {
+        const std::string flag = it->str(), name = flag.substr(2);
+        ++num_checked;
+        if (known.count(flag)) continue;
+        bool found = false;
+        for (const std::string& spelling : {'"' + name + '"', '"' + flag, '\'' + flag, ',' + flag})
+          found = found || sources.find(spelling) != std::string::npos;
+        EXPECT_TRUE(found) << page.place(line.number) << ": no program has the option " << flag;
+        if (found) known.insert(flag);
+      }
+  }
+  EXPECT_GT(num_checked, 100) << "the scan found too little to mean anything";
 }
 
 }  // namespace
