@@ -1,4 +1,4 @@
-// --view and --pixel: how a command is told of a point of the surface.
+// --view and --pixel: how the user names a point of the surface.
 #pragma once
 
 #include <memory>

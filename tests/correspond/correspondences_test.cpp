@@ -240,7 +240,7 @@ TEST(Correspondences, back_faces_are_excluded_but_both_sides_of_a_double_sided_s
   const size_t n = num_pixels(of_single), j = pixel_index(of_single, 0, 4, 4);
   EXPECT_FALSE(seen(of_single.landing[n + j]));
   EXPECT_TRUE(seen(of_both.landing[n + j]));
-  // Both sides wear one texture. Pixel (4, 4) from behind is (3, 4) from the front.
+  // Both sides have the same texture. Pixel (4, 4) from behind is (3, 4) from the front.
   EXPECT_FALSE(seen(of_single.landing[2 * n + j]));
   ASSERT_TRUE(seen(of_both.landing[2 * n + j]));
   EXPECT_NEAR(of_both.landing[2 * n + j].x, 3.5f, 1e-3f);

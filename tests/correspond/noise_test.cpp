@@ -1,4 +1,4 @@
-// What DESIGN asks of view-correlated noise: correlation between views, independence elsewhere, and how
+// View-correlated noise: correlation between views, independence elsewhere, and how
 // options and bad input are met. Whiteness stands in noise_states_test.cpp and noise_assets_test.cpp.
 #include <gtest/gtest.h>
 

@@ -15,7 +15,7 @@ namespace patina::attention {
 namespace {
 
 #ifdef PATINA_X86_KERNELS
-/// Linux gives AMX's 8 KiB of tile registers only to processes that ask.
+/// Linux gives AMX's 8 KiB of tile registers only to processes that request them.
 bool amx_permitted() {
 #ifdef __linux__
   static const bool permitted = [] {

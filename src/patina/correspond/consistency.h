@@ -15,7 +15,7 @@ namespace patina::correspond {
 struct Consistency {
   float edit_correlation = 0;  // Pearson, pairs weighted by co-visible area; NaN if nothing is co-visible or
                                // all edits are constant. Channels are centred one by one: a tint that all
-                               // views share is no agreement of detail
+                               // views share does not count as agreement
   float edit_psnr = 0;  // dB, peak 1, of the mean squared difference over co-visible area; NaN likewise
   int64_t covisible_pixels = 0;
   double covisible_area = 0;  // m², summed over ordered pairs

@@ -16,8 +16,8 @@ struct Correspondences {
   int grid = 0;                         // views a side
   int view_width = 0, view_height = 0;  // latent pixels of one view
   /// landing [num_views, N]: continuous latent coordinates inside view v of the point seen by latent pixel j
-  /// (row-major over the whole grid), NaN where j sees nothing enhanced, v is j's own view, or v does not see
-  /// the point. Of a double-sided sheet v may see the other side: both wear one texture.
+  /// (row-major over the whole grid); NaN where j shows no enhanced surface, v is j's own view, or v does not
+  /// see the point. Of a double-sided sheet v may see the other side: both sides have the same texture.
   std::vector<vec2> landing;
 };
 

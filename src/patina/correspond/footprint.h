@@ -17,7 +17,7 @@ namespace patina::correspond {
 float area_per_pixel(const render::Camera& camera, const render::Ray& ray, const views::FrontHit& front);
 
 /// views::seen_at for a point of the asset's `primitive`, which has one front or, with a double-sided
-/// material, two: both sides wear one texture, so a view of either is a view of the same surface.
+/// material, two: both sides have the same texture, so a view of either is a view of the same surface.
 std::optional<vec2> seen_from(const render::Scene& scene, const render::Camera& camera, uint32_t primitive,
                               const vec3& p_world, vec3 n_world);
 

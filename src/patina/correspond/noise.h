@@ -50,7 +50,7 @@ std::vector<NoiseField> make_noises(const render::Scene& scene, std::span<const 
 /// of a run, `seed` itself for the first.
 uint64_t block_seed(uint64_t seed, int block);
 
-/// Whiteness of one view's noise [4,h,w]: what DESIGN demands of it.
+/// Whiteness of one view's noise [4,h,w].
 struct NoiseStatistics {
   float mean = 0, variance = 0;
   float autocorrelation_x = 0, autocorrelation_y = 0;  // lag 1
@@ -58,7 +58,7 @@ struct NoiseStatistics {
   int64_t num_values = 0;
 };
 /// One entry a view of the grid. With a mask [height · width] over the whole grid only its nonzero latent
-/// pixels count, and only neighbours that both do; a view of none has num_values = 0 and the rest zero.
+/// pixels count, and only neighbours that both do; a view without any has num_values = 0 and the rest zero.
 std::vector<NoiseStatistics> noise_statistics(const NoiseField& noise, int grid,
                                               std::span<const uint8_t> mask = {});
 

@@ -1,4 +1,4 @@
-// How much of the possible correlation between two views' noise is there.
+// How much of the possible correlation the noise of two views reaches.
 #pragma once
 
 #include <span>

@@ -15,13 +15,13 @@ namespace patina::correspond {
 
 inline constexpr int kNoiseChannels = 4;
 
-/// Latent pixel p of the view is, before it is made whole,
+/// Latent pixel p of the view, before independent noise fills up its variance, is
 ///   scale[p] · Σ_k weight[k] · field(index[k]),   k = first[p] .. first[p + 1] − 1.
 /// With the weights as they are the modes make its variance one. share[p] is the part of the latent pixel's
 /// variance that it may take; the rest is independent noise.
 struct NoiseProjection {
   int width = 0, height = 0;      // latent pixels of the view
-  uint32_t field = 0;             // which field of a seed: the two kinds below share no number
+  uint32_t field = 0;             // which field of a seed: the two kinds below share no random number
   std::vector<int64_t> first{};   // [width · height + 1]
   std::vector<uint64_t> index{};  // numbers of the field
   std::vector<float> weight{};    // like index, or empty: all one

@@ -35,8 +35,8 @@ ImageHeader inspect_hdr(std::span<const uint8_t> bytes, const std::string& name,
                         const ImageLimits& limits = {});
 
 /// `bytes` of an inspected file with nothing left but what makes the pixels: text, Exif, XMP, ICC, gamma and
-/// application data are taken out (PNG, JPEG) or made opaque (EXR). Decoders parse such data although nobody
-/// asks for it, and some can be brought down by it.
+/// application data are taken out (PNG, JPEG) or made opaque (EXR). Decoders parse such data although no one
+/// asks for it, and some crash on it.
 std::vector<uint8_t> without_metadata(std::span<const uint8_t> bytes);
 
 }  // namespace patina

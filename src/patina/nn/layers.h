@@ -41,7 +41,7 @@ struct GroupNorm {
   double epsilon = 1e-5;
 
   at::Tensor operator()(const at::Tensor& x, const Recorder& record) const;
-  /// silu((*this)(x)) in one pass where nobody listens in between.
+  /// silu((*this)(x)), in one pass where nothing records the value in between.
   at::Tensor with_silu(const at::Tensor& x, const Recorder& record) const;
 };
 

@@ -1,5 +1,5 @@
-// A tap on the inside of a network: every module hands its output to the recorder under its diffusers path.
-// Costs a test of one pointer where nobody listens.
+// Records the outputs of a network's modules under their diffusers paths. Without a recorder it costs a test
+// of one pointer.
 #pragma once
 
 #include <functional>

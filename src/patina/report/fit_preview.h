@@ -1,5 +1,4 @@
-// What a running fit looks like: a page that shows itself anew every few seconds, for the browser beside the
-// terminal.
+// The live preview of a running fit: a page that reloads itself every few seconds in a browser.
 #pragma once
 
 #include <filesystem>

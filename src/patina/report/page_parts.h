@@ -1,4 +1,4 @@
-// What every HTML page of patina is put together from: one file, no network, light and dark, prints well.
+// The parts of every HTML page of patina: one file, no network, light and dark, prints well.
 #pragma once
 
 #include <string>

@@ -38,7 +38,7 @@ struct BiasTiles {
   int64_t num_tiles() const { return static_cast<int64_t>(keys.size()) / kTileKeys; }
 };
 
-/// Within a block, keys that the same warps need follow each other, so that a warp can pass over most tiles
+/// Within a block, keys that the same warps need follow each other, so that a warp can skip most tiles
 /// that hold nothing for it.
 BiasTiles make_bias_tiles(const KeyBuckets& buckets);
 
