@@ -4,7 +4,8 @@
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
 #   make bench-noise, bench-attention, bench-inverse, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
 #   make gallery      the pictures of docs/gallery.md
-#   make bench-mini   how good the small model is: build/bench/mini.json and pictures (docs/measuring-mini.md)
+#   make train-mini   the programs that make patina-mini: make_dataset and train_mini (mini/docs/training.md)
+#   make bench-mini   how good the small model is: build/bench/mini.json and pictures (mini/docs/measuring-mini.md)
 
 JOBS ?= $(shell nproc)
 DEMO_DIR := build/demo
@@ -13,12 +14,14 @@ DEMO_PROMPT ?= a rusty old kettle
 # The demo's main command, which leaves its results in folder $(1).
 demo_command = build/release/patina enhance examples/kettle.glb --prompt "$(DEMO_PROMPT)" --strength 0.9 \
 	  --model $(DEMO_MODEL) -o $(1)/kettle.glb
+# Whether `make check` tests the making of patina-mini as well.
+MINI ?= OFF
 MINI_MODEL ?= models/patina-mini
 MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini gallery clean format tidy
+.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 setup:
 	@scripts/setup.sh
@@ -28,7 +31,7 @@ build: setup
 	@cmake --build build/release --parallel $(JOBS) --target patina golden_check
 
 check: setup
-	@cmake --preset release -DPATINA_BUILD_TESTS=ON -DPATINA_BUILD_BENCH=OFF
+	@cmake --preset release -DPATINA_BUILD_TESTS=ON -DPATINA_BUILD_BENCH=OFF -DPATINA_BUILD_MINI=$(MINI)
 	@cmake --build build/release --parallel $(JOBS)
 	@scripts/run_tests.sh build/release
 
@@ -83,10 +86,14 @@ gallery: setup
 	@cmake --build build/release --parallel $(JOBS) --target make_gallery
 	OMP_WAIT_POLICY=passive build/release/make_gallery --shared $(SHARED)
 
+train-mini: setup
+	@cmake --preset release -DPATINA_BUILD_MINI=ON
+	@cmake --build build/release --parallel $(JOBS) --target make_dataset train_mini
+
 # The demo is timed in a folder of its own, from nothing. Shards that are not there are made first, in some ten minutes.
 bench-mini: DEMO_MODEL = $(MINI_MODEL)
 bench-mini: setup
-	@cmake --preset release -DPATINA_BUILD_BENCH=ON
+	@cmake --preset release -DPATINA_BUILD_MINI=ON
 	@cmake --build build/release --parallel $(JOBS) --target bench_mini patina make_dataset
 	@test -e $(MINI_SHARDS)/materials.shard || { \
 	  build/release/make_dataset objects --shared $(SHARED) --count 80 build/mini_work && \

@@ -7,7 +7,7 @@
 #include <torch/custom_class.h>
 #include <torch/library.h>
 
-#include "emulated_gpu.h"
+#include "emulated_gpu/emulated_gpu.h"
 #include "patina/attention/cuda/sparse_merge.h"
 #include "patina/base/error.h"
 #include "patina/nn/attend_cuda.h"

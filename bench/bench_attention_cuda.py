@@ -42,7 +42,7 @@ SOURCES = [
     "src/patina/attention/cuda/sparse_merge_f16.cu",
     "src/patina/base/error.cpp",
     "src/patina/nn/attend_cuda.cpp",
-    "tests/attention/emulated_gpu.cpp",
+    "tools/emulated_gpu/emulated_gpu.cpp",
 ]
 
 
@@ -90,7 +90,7 @@ def load_operators(build_dir: Path, capability: str):
     cpp_extension.load(
         "patina_bench",
         [str(ROOT / source) for source in SOURCES],
-        extra_include_paths=[str(ROOT / "src"), str(ROOT / "tests/attention")],
+        extra_include_paths=[str(ROOT / "src"), str(ROOT / "tools")],
         extra_cflags=["-O3", "-std=c++20"],
         extra_cuda_cflags=["-O3", "-std=c++20", "--expt-relaxed-constexpr"],
         build_directory=str(build_dir),

@@ -64,6 +64,14 @@ function(patina_library folder)
   target_link_libraries(patina_${folder} PUBLIC patina_options ${ARG_DEPS} ${ARG_PACKAGES} Threads::Threads)
 endfunction()
 
+# patina_tool_library(<name> SOURCES <files> DEPS <folders> [PACKAGES <targets>]): what programs and tests outside src/patina
+# share. Its headers are included with their folder: "recovery/recovery.h".
+function(patina_tool_library name)
+  patina_library(${name} ${ARGN})
+  cmake_path(GET CMAKE_CURRENT_SOURCE_DIR PARENT_PATH parent)
+  target_include_directories(patina_${name} PUBLIC "${parent}")
+endfunction()
+
 # patina_program(<name> SOURCES <files> DEPS <folders> [PACKAGES <targets>]): an executable in the build folder's root.
 function(patina_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PACKAGES" ${ARGN})

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "../../tests/inverse/recovery.h"
+#include "recovery/recovery.h"
 
 namespace patina::bench {
 

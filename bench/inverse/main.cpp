@@ -18,13 +18,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../../tests/inverse/recovery.h"
 #include "export_scene.h"
 #include "path_replay_fit.h"
 #include "patina/base/files.h"
 #include "patina/base/memory.h"
 #include "patina/image/image_io.h"
 #include "patina/render/path_tracer.h"
+#include "recovery/recovery.h"
 
 namespace {
 

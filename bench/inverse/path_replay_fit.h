@@ -2,7 +2,7 @@
 // does.
 #pragma once
 
-#include "../../tests/inverse/recovery.h"
+#include "recovery/recovery.h"
 
 namespace patina::bench {
 

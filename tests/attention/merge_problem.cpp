@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "emulated_gpu.h"
+#include "emulated_gpu/emulated_gpu.h"
 #include "patina/base/bf16.h"
 
 namespace patina::attention::test {

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "emulated_gpu.h"
+#include "emulated_gpu/emulated_gpu.h"
 #include "merge_problem.h"
 #include "patina/base/bf16.h"
 #include "patina/base/error.h"

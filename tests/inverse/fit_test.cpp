@@ -16,7 +16,7 @@
 #include "patina/inverse/loss.h"
 #include "patina/inverse/texture_field.h"
 #include "patina/inverse/unseen.h"
-#include "recovery.h"
+#include "recovery/recovery.h"
 #include "support.h"
 #include "worlds.h"
 

@@ -2,7 +2,7 @@
 // flattened to their means, nine path-traced views of the true ones as targets.
 #include <gtest/gtest.h>
 
-#include "recovery.h"
+#include "recovery/recovery.h"
 #include "support.h"
 
 namespace patina::test {

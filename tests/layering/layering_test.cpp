@@ -136,6 +136,23 @@ TEST(Layering, applications_see_no_third_party_engine) {
           << include.file.string() << ':' << include.line << " includes " << include.name;
 }
 
+// What both need is a library in tools/.
+TEST(Layering, benchmarks_and_tests_compile_nothing_of_each_other) {
+  const auto check = [](const fs::path& folder, const std::string& forbidden) {
+    for (const Include& include : includes_of(kRoot / folder))
+      EXPECT_EQ(include.name.find(forbidden), std::string::npos)
+          << include.file.string() << ':' << include.line << " includes " << include.name;
+    for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder))
+      if (entry.path().filename() == "CMakeLists.txt") {
+        EXPECT_EQ(read_text_file(entry.path()).find(forbidden), std::string::npos)
+            << entry.path() << " names " << forbidden;
+      }
+  };
+  for (const char* folder : {"bench", "tools", "mini/bench_mini", "mini/make_dataset", "mini/train_mini"})
+    check(folder, "tests/");
+  check("tests", "bench/");
+}
+
 TEST(Layering, the_rule_has_no_circles) {
   for (const auto& [folder, below] : kStandsOn)
     for (const std::string& other : below)

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "mini_data/console.h"
+#include "console/console_progress.h"
 #include "option_sheet.h"
 #include "patina/asset/asset.h"
 #include "patina/base/files.h"
@@ -112,7 +112,7 @@ void make_picture(const Entry& entry, const Arguments& arguments) {
   const fs::path folder = pipeline::run_folder_path(config);
   {
     pipeline::RunFolder run(folder);
-    pipeline::enhance(config, run, mini_data::console_progress());
+    pipeline::enhance(config, run, tools::console_progress());
   }
   write_image(picture_path(entry.name, arguments),
               make_gallery::strip(folder, asset::read_asset(config.asset), asset::read_asset(config.output),
@@ -127,7 +127,7 @@ void make_sheet(const make_gallery::OptionSheet& sheet, const Arguments& argumen
   }
   write_image(picture_path("option_" + sheet.option, arguments),
               make_gallery::option_sheet(sheet, edits, arguments.work / "options", kSheetEdits[0].view, kSide,
-                                         mini_data::console_progress()));
+                                         tools::console_progress()));
 }
 
 void make(const Arguments& arguments) {

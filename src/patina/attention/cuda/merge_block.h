@@ -1,5 +1,5 @@
 // The kernel of sparse_merge, as one thread of it runs it: all indices and arithmetic, written once. `Gpu`
-// supplies what only a GPU has; sparse_merge.cuh has the real one, tests/attention/emulated_gpu.h one that
+// supplies what only a GPU has; sparse_merge.cuh has the real one, tools/emulated_gpu/emulated_gpu.h one that
 // runs a whole block of threads on the CPU.
 //
 // The dense result is the state of an online softmax [Milakov2018] that has seen every key: maximum L, sum

@@ -1,5 +1,5 @@
 // Against Gaussians whose best possible classifier is known in closed form.
-#include "discriminant.h"
+#include "bench_mini/discriminant.h"
 
 #include <cmath>
 

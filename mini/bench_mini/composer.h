@@ -1,4 +1,4 @@
-// Pictures of known materials: plans of tools/mini_data carried out into plain images, so that the rest of
+// Pictures of known materials: plans of mini_data carried out into plain images, so that the rest of
 // the benchmark sees no Torch.
 #pragma once
 

@@ -1,12 +1,12 @@
-// train_mini: trains patina-mini. See docs/training.md.
+// train_mini: trains patina-mini. See mini/docs/training.md.
 #include <charconv>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <vector>
 
+#include "console/console_progress.h"
 #include "denoiser_training.h"
-#include "mini_data/console.h"
 #include "mini_data/plan.h"
 #include "patina/base/error.h"
 #include "samples.h"
@@ -30,8 +30,10 @@ constexpr const char* kUsage =
     "       train_mini words WORK MODEL                       teach the text encoder what words look like\n"
     "       train_mini denoiser WORK MODEL                    train text encoder, U-Net and ControlNets\n"
     "       train_mini sheet WORK MODEL [--count 6] -o PNG    look: held-out objects, fixed prompts\n"
-    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero); of them and of\n"
-    "samples: --seed S (0); of vae and denoiser: --batch N, --cuda; of denoiser: --from-model (begin with the\n"
+    "options of the trainings: --minutes M (60), --rate R, --settle (the rate falls to zero); of them and "
+    "of\n"
+    "samples: --seed S (0); of vae and denoiser: --batch N, --cuda; of denoiser: --from-model (begin with "
+    "the\n"
     "weights that MODEL has; with another seed than theirs, or it sees the same noise again)\n"
     "Each goes on where it was stopped or killed; words, which takes a minute, is refused once there is a\n"
     "text encoder. MODEL holds config.json of every component and gets the weights.\n";
@@ -104,10 +106,10 @@ int run(const std::string& command, Arguments arguments) {
     options.device = device;
     options.count = arguments.count;
     options.seed = arguments.run.seed;
-    make_samples(names[0], fs::path(names[1]) / "training", options, mini_data::console_progress());
+    make_samples(names[0], fs::path(names[1]) / "training", options, tools::console_progress());
     options.part = mini_data::Part::kHeldOut;
     options.count = arguments.count / 20;
-    make_samples(names[0], fs::path(names[1]) / "held_out", options, mini_data::console_progress());
+    make_samples(names[0], fs::path(names[1]) / "held_out", options, tools::console_progress());
   } else if (command == "captions" && names.size() == 1) {
     print_captions(names[0], arguments.count);
   } else if (command == "vae" && names.size() == 2) {

@@ -1,4 +1,4 @@
-#include "emulated_gpu.h"
+#include "emulated_gpu/emulated_gpu.h"
 
 #include <ucontext.h>
 
@@ -13,8 +13,8 @@
 #include <string>
 #include <utility>
 
-#include "patina/base/bf16.h"
 #include "patina/attention/cuda/merge_block.h"
+#include "patina/base/bf16.h"
 
 namespace patina::attention::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "parts.h"
+#include "bench_mini/parts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // How good patina's own small model is, measured on held-out shapes, materials and assets: autoencoder,
 // obedience to prompts, structure kept, what the priors add, seconds. What every figure means:
-// docs/measuring-mini.md.
+// mini/docs/measuring-mini.md.
 //
 //   bench_mini [--model DIR] [--out FILE] [--only PART ...] [--demo COMMAND]
 //
@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   const char* shared = std::getenv("PATINA_SHARED");
   arguments.shared = shared ? shared : "../shared";
-  CLI::App program("Measures patina's own small model (docs/measuring-mini.md).");
+  CLI::App program("Measures patina's own small model (mini/docs/measuring-mini.md).");
   program.add_option("--model", arguments.model, "Diffusers folder")->capture_default_str();
   program.add_option("--shards", arguments.shards, "What make_dataset packed")->capture_default_str();
   program.add_option("--shared", arguments.shared, "Folder of shared assets (else $PATINA_SHARED)")

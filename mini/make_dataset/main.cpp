@@ -1,12 +1,12 @@
-// make_dataset: makes the data that patina-mini is trained on. See docs/dataset.md.
+// make_dataset: makes the data that patina-mini is trained on. See mini/docs/dataset.md.
 #include <charconv>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <vector>
 
+#include "console/console_progress.h"
 #include "materials.h"
-#include "mini_data/console.h"
 #include "objects.h"
 #include "pack.h"
 #include "preview.h"
@@ -84,9 +84,9 @@ int main(int argc, char** argv) {
     const auto has = [&](size_t n) { return a.good && a.positional.size() == n; };
     if (command == "objects" && has(1)) {
       bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects",
-                   mini_data::console_progress());
+                   tools::console_progress());
     } else if (command == "materials" && has(1) && !a.shared.empty()) {
-      const auto entries = material_entries(a.shared / "materials", a.limit, mini_data::console_progress());
+      const auto entries = material_entries(a.shared / "materials", a.limit, tools::console_progress());
       mini_data::write_shard(fs::path(a.positional[0]) / "materials.shard", entries);
     } else if (command == "pack" && has(2)) {
       std::fputs(pack(a.positional[0], a.positional[1]).c_str(), stdout);

@@ -1,4 +1,4 @@
-#include "texture_features.h"
+#include "bench_mini/texture_features.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "recovery.h"
+#include "recovery/recovery.h"
 
 #include <algorithm>
 #include <array>

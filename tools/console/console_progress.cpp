@@ -1,9 +1,9 @@
-#include "mini_data/console.h"
+#include "console/console_progress.h"
 
 #include <chrono>
 #include <cstdio>
 
-namespace patina::mini_data {
+namespace patina::tools {
 
 Progress console_progress() {
   Progress progress;
@@ -21,4 +21,4 @@ Progress console_progress() {
   return progress;
 }
 
-}  // namespace patina::mini_data
+}  // namespace patina::tools

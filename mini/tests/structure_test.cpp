@@ -1,4 +1,4 @@
-#include "structure.h"
+#include "bench_mini/structure.h"
 
 #include <algorithm>
 #include <cmath>

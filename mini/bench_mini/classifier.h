@@ -14,7 +14,7 @@ namespace patina::bench {
 
 struct Classifier {
   Discriminant discriminant;
-  nlohmann::json trials;  // how good it is: see docs/measuring-mini.md
+  nlohmann::json trials;  // how good it is: see mini/docs/measuring-mini.md
 };
 
 /// What the classifier depends on, and with it all that it judges: the data, and the autoencoder in the

@@ -1,11 +1,11 @@
 // The judge with a classifier of three colours, on pictures whose parts are known.
-#include "judge.h"
+#include "bench_mini/judge.h"
 
 #include <gtest/gtest.h>
 
-#include "asked.h"
+#include "bench_mini/asked.h"
+#include "bench_mini/texture_features.h"
 #include "patina/base/random.h"
-#include "texture_features.h"
 
 namespace patina::bench {
 namespace {
