@@ -28,7 +28,7 @@ setup:
 
 build: setup
 	@cmake --preset release -DPATINA_BUILD_TESTS=OFF -DPATINA_BUILD_BENCH=OFF > build.log 2>&1 || { cat build.log; rm -f build.log; exit 1; }; rm -f build.log
-	@cmake --build build/release --parallel $(JOBS) --target patina golden_check
+	@cmake --build build/release --parallel $(JOBS) --target patina
 
 check: setup
 	@cmake --preset release -DPATINA_BUILD_TESTS=ON -DPATINA_BUILD_BENCH=OFF -DPATINA_BUILD_MINI=$(MINI)

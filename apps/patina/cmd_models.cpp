@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/check_model.h"
-#include "patina/diffusion/model_folders.h"
+#include "patina/diffusion/list_models.h"
 
 namespace patina::app {
 namespace {

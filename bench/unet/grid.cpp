@@ -23,9 +23,9 @@
 #include "make_checkpoint/configs.h"
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
-#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/edit_run.h"
+#include "patina/diffusion/networks/vae.h"
 #include "patina/diffusion/sampler.h"
-#include "patina/diffusion/vae.h"
 #include "patina/nn/threads.h"
 #include "random_weights.h"
 

@@ -20,8 +20,8 @@
 #include "patina/base/files.h"
 #include "patina/base/memory.h"
 #include "patina/base/parallel.h"
-#include "patina/diffusion/unet.h"
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/networks/vae.h"
 #include "patina/nn/threads.h"
 #include "random_weights.h"
 

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "patina/diffusion/detail.h"
+#include "patina/diffusion/edit.h"
 #include "patina/image/image.h"
 
 namespace patina::bench {

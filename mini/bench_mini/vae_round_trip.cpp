@@ -2,9 +2,9 @@
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 
-#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/edit_run.h"
 #include "patina/diffusion/fine_detail.h"
-#include "patina/diffusion/model.h"
+#include "patina/diffusion/model_state.h"
 #include "vae_part.h"
 
 namespace patina::bench {

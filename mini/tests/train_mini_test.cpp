@@ -8,10 +8,10 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/detail.h"
-#include "patina/diffusion/detail_run.h"
-#include "patina/diffusion/unet.h"
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/edit.h"
+#include "patina/diffusion/edit_run.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/networks/vae.h"
 #include "patina/nn/attend.h"
 #include "support.h"
 #include "train_mini/colour_path.h"
@@ -226,13 +226,13 @@ TEST(Training, goes_from_pictures_to_a_model_that_edits) {
   diffusion::ModelPaths paths;
   paths.model = model;
   const diffusion::Model trained(paths, {});
-  diffusion::DetailInputs inputs;
+  diffusion::EditInputs inputs;
   inputs.tile_views = inputs.normal_views = {Image(64, 64, 3)};
   inputs.noise = diffusion::scheduler_noise(7, 0, 8 * 8 * 8);
-  diffusion::DetailOptions options;
+  diffusion::EditOptions options;
   options.prompt = "a band";
   options.num_steps = 2;
-  const Image edited = generate_detail(trained, inputs, options, {}, {})[0];
+  const Image edited = edit_views(trained, inputs, options, {}, {})[0];
   EXPECT_EQ(edited.width, 64);
   for (const float value : edited.pixels) ASSERT_TRUE(std::isfinite(value));
 }

@@ -4,7 +4,7 @@
 
 #include "captions.h"
 #include "patina/base/error.h"
-#include "patina/diffusion/config.h"
+#include "patina/diffusion/files/config.h"
 
 namespace patina::train_mini {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <ATen/core/Tensor.h>
 
-#include "patina/diffusion/tokenizer.h"
+#include "patina/diffusion/text/tokenizer.h"
 #include "samples.h"
 
 namespace patina::train_mini {

@@ -16,10 +16,10 @@
 #include "denoiser_data.h"
 #include "parameters.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/controlnet.h"
-#include "patina/diffusion/schedulers.h"
-#include "patina/diffusion/text_encoder.h"
-#include "patina/diffusion/unet.h"
+#include "patina/diffusion/networks/controlnet.h"
+#include "patina/diffusion/networks/text_encoder.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/schedulers/schedulers.h"
 #include "workers.h"
 
 namespace patina::train_mini {

@@ -2,8 +2,8 @@
 
 #include <ATen/ATen.h>
 
-#include "patina/diffusion/detail.h"
-#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/edit.h"
+#include "patina/diffusion/edit_run.h"
 #include "patina/image/image_io.h"
 #include "patina/report/report.h"
 #include "samples.h"
@@ -34,7 +34,7 @@ void write_sheet(const std::filesystem::path& work, const std::filesystem::path&
   std::vector<Image> pictures;
   for (int row = 0; row < rows; ++row) {
     const at::Tensor sample = samples.pictures(row * samples.size() / rows);
-    diffusion::DetailInputs inputs;
+    diffusion::EditInputs inputs;
     inputs.tile_views = {image_of(sample[kTile])};
     inputs.normal_views = {image_of(sample[kNormal])};
     const int side = inputs.tile_views[0].width / model.latent_scale();
@@ -42,11 +42,11 @@ void write_sheet(const std::filesystem::path& work, const std::filesystem::path&
         /*seed=*/7, row, static_cast<size_t>(model.latent_channels()) * static_cast<size_t>(side * side));
     pictures.push_back(inputs.tile_views[0]);
     for (const char* prompt : kPrompts) {
-      diffusion::DetailOptions options;
+      diffusion::EditOptions options;
       options.prompt = prompt;
       options.strength = 1.0f;
       options.num_steps = 16;
-      pictures.push_back(generate_detail(model, inputs, options, {}, {})[0]);
+      pictures.push_back(edit_views(model, inputs, options, {}, {})[0]);
     }
   }
   write_image(sheet, report::contact_sheet(pictures, 1 + static_cast<int>(std::size(kPrompts)), 160));

@@ -17,7 +17,7 @@
 #include "parameters.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/networks/vae.h"
 #include "samples.h"
 #include "workers.h"
 

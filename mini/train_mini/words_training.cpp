@@ -12,8 +12,8 @@
 #include "captions.h"
 #include "parameters.h"
 #include "patina/base/error.h"
-#include "patina/diffusion/text_encoder.h"
-#include "patina/diffusion/tokenizer.h"
+#include "patina/diffusion/networks/text_encoder.h"
+#include "patina/diffusion/text/tokenizer.h"
 #include "samples.h"
 
 namespace patina::train_mini {

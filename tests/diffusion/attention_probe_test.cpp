@@ -16,18 +16,18 @@ using test::made_inputs, test::same_place_bias, test::short_options, test::tiny_
 
 /// Queries and keys of the default layer for 2 × 2 views of 128², biased at the same place of other views.
 struct Captured {
-  DetailInputs inputs = made_inputs(2, 128);
+  EditInputs inputs = made_inputs(2, 128);
   CapturedAttention attention;
 
-  explicit Captured(const DetailOptions& options) {
+  explicit Captured(const EditOptions& options) {
     inputs.bias_levels = same_place_bias(2, 16, 2);
     const auto layers = self_attention_layers(tiny_model(), 256, 256);
     attention = capture_attention(tiny_model(), inputs, options, find_layer(layers, ""), 0, {});
   }
 };
 
-DetailOptions biased_options() {
-  DetailOptions options = short_options();
+EditOptions biased_options() {
+  EditOptions options = short_options();
   options.num_steps = 3;
   options.bias_weight = 2;
   return options;
@@ -81,7 +81,7 @@ TEST(AttentionProbe, the_bias_raises_the_share_of_its_keys_by_the_predicted_fact
   const std::vector<int32_t> keys = attention::biased_keys(captured.inputs.bias_levels[0], query);
   ASSERT_FALSE(keys.empty());
   EXPECT_EQ(c.beta, 2);
-  DetailOptions scaled = biased_options();
+  EditOptions scaled = biased_options();
   scaled.bias_scaling = BiasScaling::kPaper;
   EXPECT_NEAR(Captured(scaled).attention.beta, 2 / std::sqrt(static_cast<double>(c.layer.head_dim)), 1e-6);
   // With p a head's share of the biased keys, the bias makes it e^β p / (1 + (e^β − 1) p).
@@ -102,8 +102,8 @@ TEST(AttentionProbe, the_bias_raises_the_share_of_its_keys_by_the_predicted_fact
 }
 
 TEST(AttentionProbe, every_listed_layer_runs_at_the_size_that_is_listed) {
-  const DetailInputs inputs = made_inputs(1, 64);
-  DetailOptions options = short_options();
+  const EditInputs inputs = made_inputs(1, 64);
+  EditOptions options = short_options();
   options.num_steps = 1, options.strength = 1, options.guidance_scale = 1;
   const std::vector<AttentionLayer> layers = self_attention_layers(tiny_model(), 64, 64);
   EXPECT_EQ(layers.size(), 2u * 3 + 1 + 3 * 3);
@@ -117,10 +117,10 @@ TEST(AttentionProbe, every_listed_layer_runs_at_the_size_that_is_listed) {
 }
 
 TEST(AttentionProbe, shows_the_evaluation_that_was_asked_for_of_the_prompts_half) {
-  const DetailInputs inputs = made_inputs(1, 64);
-  const DetailOptions options = short_options();
+  const EditInputs inputs = made_inputs(1, 64);
+  const EditOptions options = short_options();
   const AttentionLayer layer = find_layer(self_attention_layers(tiny_model(), 64, 64), "");
-  const auto capture = [&](int evaluation, const DetailOptions& o) {
+  const auto capture = [&](int evaluation, const EditOptions& o) {
     return capture_attention(tiny_model(), inputs, o, layer, evaluation, {});
   };
   const CapturedAttention first = capture(1, options), middle = capture(0, options),
@@ -131,7 +131,7 @@ TEST(AttentionProbe, shows_the_evaluation_that_was_asked_for_of_the_prompts_half
   EXPECT_GT(middle.timestep, last.timestep);
   EXPECT_NE(first.q, last.q);
   // The first evaluation of the prompt's half does not depend on the negative prompt; a later one does.
-  DetailOptions negative = options;
+  EditOptions negative = options;
   negative.negative_prompt = "a mossy stone";
   EXPECT_EQ(capture(1, negative).k, first.k);
   EXPECT_NE(capture(4, negative).k, last.k);

@@ -5,7 +5,7 @@
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/check_model.h"
-#include "patina/diffusion/weight_files.h"
+#include "patina/diffusion/files/weight_files.h"
 #include "refusals.h"
 #include "small_runs.h"
 
@@ -27,10 +27,10 @@ make::Model small_model(Family family, ElementType type = ElementType::kF32) {
 
 std::vector<Image> run(const ModelPaths& paths, Dtype dtype = Dtype::kF32, bool low_memory = false) {
   const Model model(paths, {dtype, 0, low_memory});
-  DetailOptions options = test::short_options();
+  EditOptions options = test::short_options();
   options.num_steps = 2, options.strength = 1;
   options.negative_prompt = "clean";
-  return generate_detail(model, test::made_inputs(1, 64), options, {}, {});
+  return edit_views(model, test::made_inputs(1, 64), options, {}, {});
 }
 
 class Checkpoint : public testing::TestWithParam<Family> {

@@ -1,6 +1,6 @@
 // Prompts through the text encoder: weights, long text, learned words, the end of CLIP's layers; and what a
 // U-Net predicts, asked of it.
-#include "patina/diffusion/text_conditioning.h"
+#include "patina/diffusion/text/text_conditioning.h"
 
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>

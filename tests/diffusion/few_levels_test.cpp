@@ -52,24 +52,24 @@ class ThreeLevels : public testing::Test {
 
 TEST_F(ThreeLevels, take_the_levels_that_fit_and_leave_the_coarser_ones) {
   const Model model({path(), {}, {}, {}}, {Dtype::kF32, 0});
-  DetailInputs inputs = made_inputs(2, 128);
-  DetailOptions options = short_options();
+  EditInputs inputs = made_inputs(2, 128);
+  EditOptions options = short_options();
   options.num_steps = 2, options.strength = 1;
-  const Image plain = generate_detail(model, inputs, options, {}, {})[0];
+  const Image plain = edit_views(model, inputs, options, {}, {})[0];
 
   options.bias_weight = 3;
   inputs.bias_levels = same_place_bias(2, 16, 3);
-  const Image three = generate_detail(model, inputs, options, {}, {})[0];
+  const Image three = edit_views(model, inputs, options, {}, {})[0];
   EXPECT_GT(max_difference(three, plain), 1e-3);
   inputs.bias_levels = same_place_bias(2, 16, 4);
-  EXPECT_EQ(generate_detail(model, inputs, options, {}, {})[0].pixels, three.pixels);
+  EXPECT_EQ(edit_views(model, inputs, options, {}, {})[0].pixels, three.pixels);
 }
 
 TEST_F(ThreeLevels, still_refuse_levels_that_are_no_resolution_of_theirs) {
   const Model model({path(), {}, {}, {}}, {Dtype::kF32, 0});
-  DetailInputs inputs = made_inputs(2, 128);
+  EditInputs inputs = made_inputs(2, 128);
   inputs.bias_levels = same_place_bias(2, 12, 1);
-  EXPECT_THROW(generate_detail(model, inputs, short_options(), {}, {}), Error);
+  EXPECT_THROW(edit_views(model, inputs, short_options(), {}, {}), Error);
 }
 
 }  // namespace

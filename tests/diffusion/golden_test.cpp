@@ -1,6 +1,6 @@
 // The networks against stored inputs and outputs of the reference implementation: the small cases of
 // tests/data always, all of the shared folder where it is.
-#include "patina/diffusion/golden.h"
+#include "dev/golden/golden.h"
 
 #include <set>
 

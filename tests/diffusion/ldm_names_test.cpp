@@ -1,6 +1,6 @@
 // The maps between LDM's and diffusers' names against the lists of the real models, both ways and completely,
 // and the sizes that are told from their shapes against their configurations.
-#include "patina/diffusion/ldm_names.h"
+#include "patina/diffusion/files/ldm_names.h"
 
 #include <set>
 
@@ -10,9 +10,9 @@
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/check_model.h"
-#include "patina/diffusion/infer_config.h"
-#include "patina/diffusion/network_part.h"
-#include "patina/diffusion/recognise.h"
+#include "patina/diffusion/files/infer_config.h"
+#include "patina/diffusion/files/network_part.h"
+#include "patina/diffusion/files/recognise.h"
 
 namespace patina::diffusion {
 namespace {

@@ -1,5 +1,5 @@
 // LoRAs: merged as by hand in f64, the same in every naming, and refused where they do not belong.
-#include "patina/diffusion/lora.h"
+#include "patina/diffusion/files/lora.h"
 
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
@@ -7,7 +7,7 @@
 #include "../support.h"
 #include "make_checkpoint/checkpoint.h"
 #include "patina/base/error.h"
-#include "patina/diffusion/component.h"
+#include "patina/diffusion/networks/component.h"
 
 namespace patina::diffusion {
 namespace {

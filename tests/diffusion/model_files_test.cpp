@@ -6,10 +6,10 @@
 #include "make_checkpoint/checkpoint.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/find_tokenizer.h"
-#include "patina/diffusion/model_folders.h"
+#include "patina/diffusion/list_models.h"
 #include "patina/diffusion/model_parts.h"
-#include "patina/diffusion/tokenizer.h"
+#include "patina/diffusion/text/find_tokenizer.h"
+#include "patina/diffusion/text/tokenizer.h"
 #include "refusals.h"
 
 namespace patina::diffusion {

@@ -7,8 +7,8 @@
 #include "../support.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/config.h"
-#include "patina/diffusion/detail.h"
+#include "patina/diffusion/edit.h"
+#include "patina/diffusion/files/config.h"
 #include "patina/nn/safetensors.h"
 
 namespace patina::diffusion {

@@ -1,5 +1,5 @@
 // Prompts: weights, escapes and chunks as the web UI defines them.
-#include "patina/diffusion/prompt.h"
+#include "patina/diffusion/text/prompt.h"
 
 #include <cmath>
 

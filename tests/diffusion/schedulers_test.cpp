@@ -1,6 +1,6 @@
 // Schedulers against trajectories of the reference implementation (tests/data/golden/schedulers holds one or
 // two variants a class, the shared folder all), and what must hold of any of them.
-#include "patina/diffusion/schedulers.h"
+#include "patina/diffusion/schedulers/schedulers.h"
 
 #include <cmath>
 #include <cstring>

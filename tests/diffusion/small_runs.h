@@ -8,12 +8,11 @@
 
 #include "../support.h"
 #include "patina/base/random.h"
-#include "patina/diffusion/detail.h"
+#include "patina/diffusion/edit.h"
 
 namespace patina::test {
 
-using diffusion::DetailInputs, diffusion::DetailOptions, diffusion::Dtype, diffusion::Model,
-    diffusion::Scheduler;
+using diffusion::EditInputs, diffusion::EditOptions, diffusion::Dtype, diffusion::Model, diffusion::Scheduler;
 
 inline const Model& tiny_model() {
   static const Model model({data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, 0});
@@ -28,8 +27,8 @@ inline double psnr(const Image& a, const Image& b) {
 }
 
 /// Smooth views of `size`² pixels that differ from one another, and noise for them.
-inline DetailInputs made_inputs(int grid, int size) {
-  DetailInputs inputs;
+inline EditInputs made_inputs(int grid, int size) {
+  EditInputs inputs;
   inputs.grid = grid;
   for (int v = 0; v < grid * grid; ++v) {
     Image tile(size, size, 3), normal(size, size, 3);
@@ -79,8 +78,8 @@ inline std::vector<attention::KeyBuckets> same_place_bias(int grid, int view, in
   return levels;
 }
 
-inline DetailOptions short_options(Scheduler scheduler = Scheduler::kUniPc) {
-  DetailOptions options;
+inline EditOptions short_options(Scheduler scheduler = Scheduler::kUniPc) {
+  EditOptions options;
   options.prompt = "a rusty old kettle";
   options.num_steps = 5;
   options.strength = 0.8f;

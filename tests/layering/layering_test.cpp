@@ -39,6 +39,23 @@ Folders reachable(const std::string& folder) {
   return out;
 }
 
+// The wings of folders that have some: what each stands on directly. Loose headers of the folder that wings
+// may see too are named with their file.
+const std::map<std::string, std::map<std::string, Folders>> kWings{
+    {"diffusion",
+     {{"options.h", {}},
+      {"files", {"options.h"}},
+      {"schedulers", {"options.h"}},
+      {"networks", {"files"}},
+      {"text", {"networks"}}}},
+};
+
+Folders reachable_wings(const std::map<std::string, Folders>& wings, const std::string& wing) {
+  Folders out{wing};
+  for (const std::string& below : wings.at(wing)) out.merge(reachable_wings(wings, below));
+  return out;
+}
+
 // Third-party headers that only some folders may see, by how their names begin.
 struct Restricted {
   std::string prefix;
@@ -108,6 +125,25 @@ TEST(Layering, folders_include_only_what_they_stand_on) {
     ++num_checked;
   }
   EXPECT_GT(num_checked, 100) << "the scan found too little to mean anything";
+}
+
+TEST(Layering, wings_include_only_what_they_stand_on) {
+  for (const auto& [folder, wings] : kWings) {
+    const fs::path root = kRoot / "src" / "patina" / folder;
+    for (const auto& entry : fs::directory_iterator(root))
+      if (entry.is_directory()) {
+        EXPECT_TRUE(wings.count(entry.path().filename().string())) << entry.path() << " has no rule";
+      }
+    for (const Include& include : includes_of(root)) {
+      const std::string wing = first_folder(fs::relative(include.file, root));
+      const std::string prefix = "patina/" + folder + "/";
+      if (!wings.count(wing) || include.name.rfind(prefix, 0) != 0) continue;
+      const std::string to = first_folder(fs::path(include.name.substr(prefix.size())));
+      EXPECT_TRUE(reachable_wings(wings, wing).count(to))
+          << include.file.string() << ':' << include.line << " includes " << include.name << ", but " << wing
+          << " may not stand on " << to;
+    }
+  }
 }
 
 TEST(Layering, third_party_headers_stay_in_their_folders) {

@@ -12,12 +12,12 @@
 
 #include "patina/base/check.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/controlnet.h"
-#include "patina/diffusion/dry_run.h"
-#include "patina/diffusion/ldm_names.h"
-#include "patina/diffusion/text_encoder.h"
-#include "patina/diffusion/unet.h"
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/files/ldm_names.h"
+#include "patina/diffusion/networks/controlnet.h"
+#include "patina/diffusion/networks/dry_run.h"
+#include "patina/diffusion/networks/text_encoder.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/networks/vae.h"
 
 namespace patina::make_checkpoint {
 namespace {

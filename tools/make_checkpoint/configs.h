@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "patina/diffusion/config.h"
-#include "patina/diffusion/infer_config.h"
+#include "patina/diffusion/files/config.h"
+#include "patina/diffusion/files/infer_config.h"
 
 namespace patina::make_checkpoint {
 

@@ -8,7 +8,7 @@
 
 #include "patina/base/check.h"
 #include "patina/base/error.h"
-#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/edit_run.h"
 
 namespace patina::diffusion {
 namespace {
@@ -99,11 +99,10 @@ AttentionLayer find_layer(const std::vector<AttentionLayer>& layers, std::string
                   "'; there are, by latent pixels of the grid, " + layer_list(layers));
 }
 
-CapturedAttention capture_attention(const Model& model, const DetailInputs& inputs,
-                                    const DetailOptions& options, const AttentionLayer& layer, int evaluation,
-                                    const Progress& progress) {
+CapturedAttention capture_attention(const Model& model, const EditInputs& inputs, const EditOptions& options,
+                                    const AttentionLayer& layer, int evaluation, const Progress& progress) {
   const c10::InferenceMode inference;
-  const std::unique_ptr<DetailRun> run = start_detail(model, inputs, options, std::nullopt, progress);
+  const std::unique_ptr<EditRun> run = start_edit(model, inputs, options, std::nullopt, progress);
   CapturedAttention captured;
   captured.layer = layer;
   captured.num_evaluations = run->plan.num_calls() - run->start;

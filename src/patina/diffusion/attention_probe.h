@@ -2,7 +2,13 @@
 // the softmax row of one query [Hadadan2025, Fig. 3]. No Torch type passes this header.
 #pragma once
 
-#include "patina/diffusion/detail.h"
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "patina/diffusion/edit.h"
 
 namespace patina::diffusion {
 
@@ -33,12 +39,11 @@ struct CapturedAttention {
   float beta = 0;       // what the bias adds to the exponent here
 };
 
-/// Runs generate_detail's way up to evaluation `evaluation` (from 1; 0: the middle one) and returns what
+/// Runs edit_views's way up to evaluation `evaluation` (from 1; 0: the middle one) and returns what
 /// `layer` saw in it; the bias acts in the run as the options say. Throws Error{kUsage} where there is no
 /// such evaluation.
-CapturedAttention capture_attention(const Model& model, const DetailInputs& inputs,
-                                    const DetailOptions& options, const AttentionLayer& layer, int evaluation,
-                                    const Progress& progress);
+CapturedAttention capture_attention(const Model& model, const EditInputs& inputs, const EditOptions& options,
+                                    const AttentionLayer& layer, int evaluation, const Progress& progress);
 
 /// The attention weights of `query` over all N keys: softmax_j(q·k_j/√d + β·[j ∈ biased_keys]), mean over the
 /// heads. [N] f32, sum 1. O(N·d). `biased_keys` ascending, as attention::biased_keys gives them.

@@ -4,15 +4,15 @@
 #include <cstring>
 
 #include "patina/base/error.h"
-#include "patina/diffusion/controlnet.h"
-#include "patina/diffusion/detail.h"
-#include "patina/diffusion/dry_run.h"
-#include "patina/diffusion/embedding.h"
-#include "patina/diffusion/model_folders.h"
+#include "patina/diffusion/files/embedding.h"
+#include "patina/diffusion/list_models.h"
+#include "patina/diffusion/model.h"
 #include "patina/diffusion/model_parts.h"
-#include "patina/diffusion/text_encoder.h"
-#include "patina/diffusion/unet.h"
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/networks/controlnet.h"
+#include "patina/diffusion/networks/dry_run.h"
+#include "patina/diffusion/networks/text_encoder.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/networks/vae.h"
 
 namespace patina::diffusion {
 namespace {

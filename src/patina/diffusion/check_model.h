@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "patina/diffusion/network_part.h"
+#include "patina/diffusion/files/network_part.h"
 
 namespace patina::diffusion {
 

@@ -2,7 +2,7 @@
 // that see Torch.
 #pragma once
 
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/networks/vae.h"
 
 namespace patina::diffusion {
 

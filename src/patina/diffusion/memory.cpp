@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "patina/diffusion/detail_run.h"
+#include "patina/diffusion/edit_run.h"
 
 namespace patina::diffusion {
 namespace {
@@ -22,8 +22,8 @@ constexpr double kKeptFromConverting = 0.03;  // of the weights' bytes
 
 }  // namespace
 
-DetailMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
-                            const DetailOptions& options) {
+EditMemory predict_memory(const Model& model, int grid, int view_width, int view_height,
+                          const EditOptions& options) {
   const Model::State& networks = model.state();
   const int64_t bytes = networks.dtype == Dtype::kF32 ? 4 : 2;
   const auto bytes_of = [&](const auto& held) {
@@ -31,7 +31,7 @@ DetailMemory predict_memory(const Model& model, int grid, int view_width, int vi
   };
   const int64_t text = bytes_of(networks.text_encoder), vae = bytes_of(networks.vae),
                 tile = bytes_of(networks.controlnet_tile), normal = bytes_of(networks.controlnet_normal);
-  DetailMemory memory;
+  EditMemory memory;
   const int64_t weights =
       networks.unet.num_bytes() +
       (networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal}));

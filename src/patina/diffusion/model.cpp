@@ -8,8 +8,9 @@
 
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
-#include "patina/diffusion/component.h"
 #include "patina/diffusion/model_parts.h"
+#include "patina/diffusion/model_state.h"
+#include "patina/diffusion/networks/component.h"
 #include "patina/diffusion/prediction.h"
 
 namespace patina::diffusion {
@@ -156,6 +157,14 @@ std::string Model::description() const {
          millions(s.controlnet_tile.num_parameters()) + ", VAE " + millions(s.vae.num_parameters()) +
          ", text encoder " + millions(s.text_encoder.num_parameters()) + " parameters, " + name_of(s.dtype) +
          (s.device == Device::kCuda ? " on CUDA" : "") + notes;
+}
+
+Guidance guidance_of(const Model& model, const EditOptions& options) {
+  const Guidance& defaults = model.state().guidance;
+  Guidance guidance{options.guidance_scale == kAutoGuidanceScale ? defaults.scale : options.guidance_scale,
+                    options.negative_prompt.value_or(defaults.negative_prompt)};
+  if (guidance.scale == 1) guidance.negative_prompt.clear();
+  return guidance;
 }
 
 }  // namespace patina::diffusion

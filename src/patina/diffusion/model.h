@@ -1,33 +1,50 @@
-// What stands behind diffusion::Model: the loaded networks. Seen only by the sources that see Torch.
+// A diffusion model as the rest of patina sees it: weight files in, an opaque model out. No Torch type passes
+// this header.
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <memory>
+#include <string>
+#include <vector>
 
-#include "patina/diffusion/controlnet.h"
-#include "patina/diffusion/detail.h"
-#include "patina/diffusion/held.h"
-#include "patina/diffusion/model_parts.h"
-#include "patina/diffusion/schedulers.h"
-#include "patina/diffusion/text_conditioning.h"
-#include "patina/diffusion/tokenizer.h"
-#include "patina/diffusion/unet.h"
-#include "patina/diffusion/vae.h"
+#include "patina/diffusion/options.h"
 
 namespace patina::diffusion {
 
-struct Model::State {
-  Dtype dtype = Dtype::kF32;
-  Device device = Device::kCpu;
-  Tokenizer tokenizer;
-  Held<TextEncoder> text_encoder;
-  UNet unet;
-  Held<Vae> vae;
-  Held<ControlNet> controlnet_tile, controlnet_normal;
-  SchedulerConfig scheduler;
-  Guidance guidance;  // where the user names nothing else
-  LearnedWords words;
-  std::vector<std::string> notes;  // what was chosen without being told to, for the description
+/// Looks at the folders and weight files of a model without loading it. Throws Error that names what is
+/// missing, broken or a pickle.
+void check_model(const ModelPaths& paths);
+
+/// Throws Error if there is no such device here, or it does not compute in this precision.
+void check_device(Device device, Dtype dtype);
+
+/// Every file that a model is read from; what tells whether it changed.
+std::vector<std::filesystem::path> model_files(const ModelPaths& paths);
+
+/// A loaded model: weights are memory-mapped. Opaque; move-only.
+class Model {
+ public:
+  /// Throws Error that names the file and tensor: missing, wrongly shaped (expected and found), malformed, a
+  /// pickle. Throws as check_device.
+  Model(const ModelPaths& paths, const ModelOptions& options);
+  ~Model();
+  Model(Model&&) noexcept;
+  Model& operator=(Model&&) noexcept;
+
+  int latent_scale() const;  // image pixels a latent pixel, from the VAE's config
+  int latent_channels() const;
+  Dtype dtype() const;              // what kAuto became
+  Device device() const;            // likewise
+  std::string description() const;  // family, parameters, precision: one line for logs and config.json
+
+  struct State;
+  const State& state() const { return *state_; }
+
+ private:
+  std::unique_ptr<State> state_;
 };
+
+/// What the options ask for, or the model's own where they leave it open; a scale of 1 goes with no words.
+Guidance guidance_of(const Model& model, const EditOptions& options);
 
 }  // namespace patina::diffusion

@@ -8,8 +8,9 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/diffusion/find_tokenizer.h"
-#include "patina/diffusion/model_folders.h"
+#include "patina/diffusion/files/search_folders.h"
+#include "patina/diffusion/list_models.h"
+#include "patina/diffusion/text/find_tokenizer.h"
 
 namespace patina::diffusion {
 namespace {

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "patina/diffusion/detail.h"
-#include "patina/diffusion/embedding.h"
-#include "patina/diffusion/infer_config.h"
-#include "patina/diffusion/lora.h"
-#include "patina/diffusion/network_part.h"
-#include "patina/diffusion/schedulers.h"
+#include "patina/diffusion/files/embedding.h"
+#include "patina/diffusion/files/infer_config.h"
+#include "patina/diffusion/files/lora.h"
+#include "patina/diffusion/files/network_part.h"
+#include "patina/diffusion/options.h"
+#include "patina/diffusion/schedulers/schedulers.h"
 
 namespace patina::diffusion {
 

@@ -1,8 +1,8 @@
 // What a U-Net was trained to tell, asked of the U-Net itself.
 #pragma once
 
-#include "patina/diffusion/schedulers.h"
-#include "patina/diffusion/unet.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/schedulers/schedulers.h"
 
 namespace patina::diffusion {
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "patina/base/progress.h"
-#include "patina/diffusion/controlnet.h"
-#include "patina/diffusion/held.h"
-#include "patina/diffusion/schedulers.h"
-#include "patina/diffusion/unet.h"
+#include "patina/diffusion/networks/controlnet.h"
+#include "patina/diffusion/networks/held.h"
+#include "patina/diffusion/networks/unet.h"
+#include "patina/diffusion/schedulers/schedulers.h"
 
 namespace patina::diffusion {
 

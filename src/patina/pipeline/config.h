@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "patina/correspond/noise.h"
-#include "patina/diffusion/detail.h"
+#include "patina/diffusion/options.h"
 #include "patina/inverse/fit.h"
 #include "patina/render/path_tracer.h"
 #include "patina/views/view_set.h"
@@ -42,7 +42,7 @@ struct Config {
   diffusion::Dtype dtype = diffusion::Dtype::kAuto;
   diffusion::Device device = diffusion::Device::kAuto;
   bool low_memory = false;
-  diffusion::DetailOptions detail{.bias_weight = 1.8f};  // docs/decisions/0012
+  diffusion::EditOptions detail{.bias_weight = 1.8f};  // docs/decisions/0012
   correspond::NoiseMode noise = correspond::NoiseMode::kExact;
 
   // How the detail is carried into the textures.

@@ -6,6 +6,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/diffusion/model.h"
 #include "patina/pipeline/options.h"
 
 namespace patina::pipeline {

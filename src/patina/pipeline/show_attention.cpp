@@ -48,7 +48,7 @@ ShownAttention show_attention(const Config& config, const AttentionOptions& opti
   const RenderedViews views = render_stage(bench, config, run, progress);
   const PickedPoint point = pick_point(*bench.scene, views.set, options.point);
   const PreparedDetail prepared = prepare_detail(bench, views, config, model, progress);
-  diffusion::DetailOptions detail = config.detail;
+  diffusion::EditOptions detail = config.detail;
   detail.seed = config.seed;
   ShownAttention shown;
   shown.negative_prompt = diffusion::guidance_of(model, detail).negative_prompt;

@@ -69,7 +69,7 @@ double megabytes(int64_t bytes) {
 }
 
 // Once a machine swaps, steps take minutes: better said before the first one. The weights are there by now.
-void warn_of_memory(const diffusion::DetailMemory& memory, const Config& config, const Progress& progress) {
+void warn_of_memory(const diffusion::EditMemory& memory, const Config& config, const Progress& progress) {
   const int64_t available = available_bytes();
   if (available == 0 || memory.activations <= available) return;
   progress.warn(
@@ -135,18 +135,18 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
     const double load_seconds = seconds_since(start);
     const PreparedDetail prepared = prepare_detail(bench, views, config, *model, progress);
 
-    diffusion::DetailOptions options = config.detail;
+    diffusion::EditOptions options = config.detail;
     options.seed = config.seed;
-    const diffusion::DetailMemory memory = diffusion::predict_memory(
+    const diffusion::EditMemory memory = diffusion::predict_memory(
         *model, views.set.grid, bench.cameras[0].width, bench.cameras[0].height, options);
     if (model->device() == diffusion::Device::kCpu) warn_of_memory(memory, config, progress);
-    diffusion::DetailHooks hooks;
+    diffusion::EditHooks hooks;
     hooks.on_checkpoint = [&](const diffusion::Checkpoint& c) {
       run.save_checkpoint("detail", key, c.next_step, c.bytes);
     };
     if (auto saved = run.load_checkpoint("detail", key))
       hooks.resume = diffusion::Checkpoint{.next_step = saved->step, .bytes = std::move(saved->bytes)};
-    std::vector<Image> edited = diffusion::generate_detail(*model, prepared.inputs, options, hooks, progress);
+    std::vector<Image> edited = diffusion::edit_views(*model, prepared.inputs, options, hooks, progress);
 
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {

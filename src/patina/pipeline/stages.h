@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "patina/diffusion/edit.h"
 #include "patina/pipeline/config.h"
 #include "patina/pipeline/run_folder.h"
 #include "patina/pipeline/workbench.h"
@@ -29,7 +30,7 @@ RenderedViews render_stage(const Workbench& bench, const Config& config, RunFold
 /// What the diffusion model is given beside the options: control images, noise and correspondences. Its seed
 /// is config.seed. Throws Error{kUsage} if the views do not fit the model.
 struct PreparedDetail {
-  diffusion::DetailInputs inputs;
+  diffusion::EditInputs inputs;
   nlohmann::json noise_metrics;
   double noise_seconds = 0, correspond_seconds = 0;
 };

@@ -1,0 +1,211 @@
+// Everything before the first step: checks, text and condition images through their encoders, start latents.
+#include "patina/diffusion/edit_run.h"
+
+#include <algorithm>
+
+#include <ATen/ATen.h>
+
+#include "patina/base/error.h"
+#include "patina/base/random.h"
+
+namespace patina::diffusion {
+namespace {
+
+[[noreturn]] void usage(const std::string& where, const std::string& message) {
+  throw Error(ErrorCode::kUsage, where, message);
+}
+
+std::string size_text(int64_t width, int64_t height) {
+  return std::to_string(width) + " × " + std::to_string(height);
+}
+
+void check_views(const std::vector<Image>& views, const char* name, const GridSizes& sizes) {
+  const auto expected = static_cast<size_t>(sizes.grid * sizes.grid);
+  if (views.size() != expected) {
+    usage(name, "there are " + std::to_string(views.size()) + " images, expected " +
+                    std::to_string(expected) + " for a grid of " + size_text(sizes.grid, sizes.grid));
+  }
+  for (const Image& view : views) {
+    if (view.width != sizes.view_width || view.height != sizes.view_height || view.channels != 3) {
+      usage(name, "an image is " + size_text(view.width, view.height) + " with " +
+                      std::to_string(view.channels) + " channels, expected " +
+                      size_text(sizes.view_width, sizes.view_height) + " with 3");
+    }
+  }
+}
+
+/// The biased levels must be the U-Net's own resolutions: each is half the last, rounded up as its strided
+/// convolutions do. Levels coarser than all of them are nobody's and may be there: correspondences are made
+/// without knowing how many levels a model has.
+void check_bias(const std::vector<attention::KeyBuckets>& levels, const GridSizes& sizes, size_t num_levels) {
+  using Size = std::pair<int64_t, int64_t>;  // width, height
+  std::vector<Size> resolutions{{sizes.grid * sizes.latent_width, sizes.grid * sizes.latent_height}};
+  while (resolutions.size() < num_levels) {
+    const auto [width, height] = resolutions.back();
+    resolutions.emplace_back((width + 1) / 2, (height + 1) / 2);
+  }
+  const auto [coarsest_width, coarsest_height] = resolutions.back();
+  for (const attention::KeyBuckets& buckets : levels) {
+    attention::validate(buckets);
+    if (buckets.width() < coarsest_width && buckets.height() < coarsest_height) continue;
+    if (std::find(resolutions.begin(), resolutions.end(), Size(buckets.width(), buckets.height())) ==
+        resolutions.end()) {
+      usage("bias", "a level is made for " + size_text(buckets.width(), buckets.height()) +
+                        " latent pixels, which is no resolution of the "
+                        "U-Net for a grid of " +
+                        size_text(resolutions[0].first, resolutions[0].second) +
+                        " latent pixels; views whose size is a multiple of 64 pixels always fit");
+    }
+  }
+}
+
+GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const EditOptions& options) {
+  if (inputs.grid < 1) usage("grid", "is " + std::to_string(inputs.grid) + ", expected at least 1");
+  if (inputs.tile_views.empty()) usage("tile views", "there are none");
+  const int64_t scale = model.latent_scale();
+  const Image& first = inputs.tile_views.front();
+  const GridSizes sizes{inputs.grid, first.height, first.width, first.height / scale, first.width / scale};
+  if (first.width <= 0 || first.height <= 0 || first.width % scale || first.height % scale) {
+    usage("tile views", "are " + size_text(first.width, first.height) + " pixels; expected multiples of " +
+                            std::to_string(scale));
+  }
+  check_views(inputs.tile_views, "tile views", sizes);
+  check_views(inputs.normal_views, "normal views", sizes);
+  if (!inputs.start_views.empty()) check_views(inputs.start_views, "start views", sizes);
+  const int64_t noise_size =
+      model.latent_channels() * sizes.grid * sizes.grid * sizes.latent_height * sizes.latent_width;
+  if (static_cast<int64_t>(inputs.noise.size()) != noise_size) {
+    usage("noise",
+          "has " + std::to_string(inputs.noise.size()) + " values, expected " + std::to_string(noise_size));
+  }
+  const auto in_range = [](const char* name, double value, double low, double high) {
+    if (!(value >= low && value <= high)) {
+      usage(name, "is " + std::to_string(value) + ", expected " + std::to_string(low) + " to " +
+                      std::to_string(high));
+    }
+  };
+  in_range("steps", options.num_steps, 1, 1000);
+  in_range("guidance scale", options.guidance_scale, 0, 100);
+  in_range("strength", options.strength, 0, 1);
+  in_range("tile scale", options.tile_scale, 0, 10);
+  in_range("normal scale", options.normal_scale, 0, 10);
+  in_range("fine detail", options.fine_detail, 0, 1);
+  in_range("bias", options.bias_weight, -1000, 1000);
+  check_bias(inputs.bias_levels, sizes, model.state().unet.config().levels.size());
+  return sizes;
+}
+
+/// grid² tensors [1,C,h,w], row by row -> [1,C,grid·h,grid·w].
+at::Tensor tile(const std::vector<at::Tensor>& views, int64_t grid) {
+  std::vector<at::Tensor> rows;
+  for (int64_t row = 0; row < grid; ++row) {
+    const auto begin = views.begin() + row * grid;
+    rows.push_back(at::cat(std::vector<at::Tensor>(begin, begin + grid), 3));
+  }
+  return at::cat(rows, 2);
+}
+
+/// The whole grid's condition image through a ControlNet's embedding.
+at::Tensor grid_hint(const Held<ControlNet>& network, const std::vector<Image>& views, int64_t grid) {
+  std::vector<at::Tensor> tensors;
+  for (const Image& view : views) tensors.push_back(tensor_from_image(view));
+  return network.use()->hint(tile(tensors, grid));
+}
+
+/// Posterior means of the start images, scaled to unit variance, as one grid [C,H,W].
+std::vector<float> start_latents(const Vae& vae, const std::vector<Image>& views, int64_t grid,
+                                 const Progress& progress) {
+  std::vector<at::Tensor> latents;
+  for (const Image& view : views) {
+    progress.throw_if_stopped();
+    latents.push_back(vae.encode(2 * tensor_from_image(view) - 1).mean.cpu() * vae.config().scaling_factor);
+    progress.update("encode", static_cast<double>(latents.size()), static_cast<double>(views.size()));
+  }
+  const at::Tensor tiled = tile(latents, grid).contiguous();
+  return {tiled.data_ptr<float>(), tiled.data_ptr<float>() + tiled.numel()};
+}
+
+}  // namespace
+
+at::Tensor tensor_from_image(const Image& image) {
+  const at::Tensor pixels = at::from_blob(const_cast<float*>(image.pixels.data()),
+                                          {1, image.height, image.width, image.channels}, at::kFloat);
+  return pixels.permute({0, 3, 1, 2}).clone();
+}
+
+Image image_from_tensor(const at::Tensor& tensor) {
+  const at::Tensor pixels = tensor.permute({0, 2, 3, 1}).contiguous();
+  Image image(static_cast<int>(pixels.size(2)), static_cast<int>(pixels.size(1)),
+              static_cast<int>(pixels.size(3)));
+  std::copy_n(pixels.data_ptr<float>(), image.pixels.size(), image.pixels.begin());
+  return image;
+}
+
+bool guides_in_one_batch(const UNetConfig& unet, int64_t latent_pixels) {
+  // Of small maps one batch is some 4 % faster, of larger ones as fast as two (docs/performance.md).
+  constexpr int64_t kSmallMap = 2'000'000;
+  return unet.levels.front().channels * latent_pixels <= kSmallMap;
+}
+
+std::vector<float> scheduler_noise(uint64_t seed, int call, size_t size) {
+  std::vector<float> noise(size);
+  for (size_t i = 0; i < size; i += 4) {
+    const std::array<float, 4> four =
+        gaussian4(seed, RandomPurpose::kSchedulerNoise, i / 4, static_cast<uint32_t>(call));
+    std::copy_n(four.begin(), std::min<size_t>(4, size - i), noise.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return noise;
+}
+
+std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs, const EditOptions& options,
+                                    const std::optional<Checkpoint>& resume, const Progress& progress) {
+  auto run = std::make_unique<EditRun>();
+  run->sizes = checked_sizes(model, inputs, options);
+  const GridSizes& sizes = run->sizes;
+  const Model::State& networks = model.state();
+
+  run->plan = make_schedule(choose_scheduler(networks.scheduler, options.scheduler), options.num_steps);
+  run->start = start_index(run->plan, options.strength);
+  run->shape = {1, networks.vae.config().latent_channels, sizes.grid * sizes.latent_height,
+                sizes.grid * sizes.latent_width};
+
+  // What stays the same over all steps.
+  run->bias = {inputs.bias_levels, options.bias_weight, options.bias_scaling == BiasScaling::kPaper};
+  std::vector<std::string> prompts{options.prompt};
+  const Guidance guidance = guidance_of(model, options);
+  if (guidance.scale != 1) prompts.insert(prompts.begin(), guidance.negative_prompt);
+  const at::Tensor text = encode_prompts(networks.tokenizer, *networks.text_encoder.use(), networks.words,
+                                         prompts, options.clip_skip);
+  run->denoiser = {
+      &networks.unet,
+      {{&networks.controlnet_tile, grid_hint(networks.controlnet_tile, inputs.tile_views, sizes.grid),
+        options.tile_scale},
+       {&networks.controlnet_normal, grid_hint(networks.controlnet_normal, inputs.normal_views, sizes.grid),
+        options.normal_scale}},
+      text,
+      guidance.scale,
+      guides_in_one_batch(networks.unet.config(), run->shape[2] * run->shape[3]),
+      &run->bias,
+      options.bias_controlnet};
+
+  // The start: the images at the noise level of the first step [Meng2022], or where an earlier run stood.
+  SamplerState& state = run->state;
+  if (resume) {
+    state = sampler_state_from_bytes(resume->bytes);
+    if (state.latents.size() != inputs.noise.size() || state.next_call < run->start ||
+        state.next_call > run->plan.num_calls()) {
+      throw Error(ErrorCode::kFormat, "checkpoint",
+                  "belongs to a run with other sizes or steps; start the stage again");
+    }
+  } else {
+    const std::vector<Image>& start_views =
+        inputs.start_views.empty() ? inputs.tile_views : inputs.start_views;
+    state.next_call = run->start;
+    state.latents =
+        add_noise(run->plan, run->start,
+                  start_latents(*networks.vae.use(), start_views, sizes.grid, progress), inputs.noise);
+  }
+  return run;
+}
+
+}  // namespace patina::diffusion

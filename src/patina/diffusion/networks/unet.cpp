@@ -1,0 +1,199 @@
+#include "patina/diffusion/networks/unet.h"
+
+#include <cmath>
+
+#include <ATen/ATen.h>
+
+#include "patina/base/check.h"
+#include "patina/diffusion/networks/component.h"
+
+namespace patina::diffusion {
+namespace {
+
+constexpr int64_t kTimeFactor = 4;  // width of the time embedding over that of the finest level
+
+int64_t time_width(const UNetConfig& config) {
+  return kTimeFactor * config.levels.front().channels;
+}
+
+ResnetBlock load_unet_resnet(nn::WeightReader& weights, const std::string& name, int64_t in, int64_t out,
+                             const UNetConfig& config) {
+  return load_resnet(weights, name, in, out, time_width(config), config.norm_num_groups, config.norm_epsilon);
+}
+
+DownBlock load_down_block(nn::WeightReader& weights, size_t index, const UNetConfig& config) {
+  const LevelConfig& level = config.levels[index];
+  DownBlock block;
+  block.name = "down_blocks." + std::to_string(index);
+  int64_t in = config.levels[index > 0 ? index - 1 : 0].channels;
+  for (int64_t i = 0; i < level.num_layers; ++i) {
+    const std::string number = std::to_string(i);
+    block.resnets.push_back(
+        load_unet_resnet(weights, block.name + ".resnets." + number, in, level.channels, config));
+    if (level.down_attention) {
+      block.attentions.push_back(
+          load_transformer(weights, block.name + ".attentions." + number, level, config));
+    }
+    in = level.channels;
+  }
+  if (index + 1 < config.levels.size()) {
+    const std::string name = block.name + ".downsamplers.0";
+    block.downsamplers_0 =
+        Downsample{name, nn::load_conv2d(weights, name + ".conv", in, in, 3, /*stride=*/2)};
+  }
+  return block;
+}
+
+/// up_blocks count from the coarsest level.
+UpBlock load_up_block(nn::WeightReader& weights, size_t index, const UNetConfig& config) {
+  const size_t level_index = config.levels.size() - 1 - index;
+  const LevelConfig& level = config.levels[level_index];
+  const int64_t below = config.levels[std::min(level_index + 1, config.levels.size() - 1)].channels;
+  const int64_t above = config.levels[level_index > 0 ? level_index - 1 : 0].channels;
+  UpBlock block;
+  block.name = "up_blocks." + std::to_string(index);
+  int64_t in = below;
+  for (int64_t i = 0; i <= level.num_layers; ++i) {
+    const std::string number = std::to_string(i);
+    // The last layer meets the output of the level above (its downsampler, or conv_in), the others this
+    // level's own.
+    const int64_t skip = i == level.num_layers ? above : level.channels;
+    block.resnets.push_back(
+        load_unet_resnet(weights, block.name + ".resnets." + number, in + skip, level.channels, config));
+    if (level.up_attention) {
+      block.attentions.push_back(
+          load_transformer(weights, block.name + ".attentions." + number, level, config));
+    }
+    in = level.channels;
+  }
+  if (level_index > 0) {
+    const std::string name = block.name + ".upsamplers.0";
+    block.upsamplers_0 = Upsample{name, nn::load_conv2d(weights, name + ".conv", in, in, 3)};
+  }
+  return block;
+}
+
+}  // namespace
+
+at::Tensor timestep_embedding(const at::Tensor& timesteps, int64_t width, bool flip_sin_to_cos,
+                              double freq_shift) {
+  const int64_t half = width / 2;
+  const at::Tensor exponents = -std::log(10000.0) * at::arange(half, timesteps.options().dtype(at::kFloat)) /
+                               (static_cast<double>(half) - freq_shift);
+  const at::Tensor angles = timesteps.to(at::kFloat).unsqueeze(1) * at::exp(exponents).unsqueeze(0);
+  const at::Tensor sines = at::sin(angles), cosines = at::cos(angles);
+  const at::Tensor embedding = flip_sin_to_cos ? at::cat({cosines, sines}, 1) : at::cat({sines, cosines}, 1);
+  return width % 2 ? at::constant_pad_nd(embedding, {0, 1}) : embedding;
+}
+
+std::vector<int64_t> skip_channels(const UNetConfig& config) {
+  std::vector<int64_t> channels{config.levels.front().channels};
+  for (size_t i = 0; i < config.levels.size(); ++i) {
+    const bool downsampled = i + 1 < config.levels.size();
+    channels.insert(channels.end(), static_cast<size_t>(config.levels[i].num_layers) + (downsampled ? 1 : 0),
+                    config.levels[i].channels);
+  }
+  return channels;
+}
+
+Encoder load_encoder(nn::WeightReader& weights, const UNetConfig& config) {
+  const int64_t finest = config.levels.front().channels, time = time_width(config);
+  const LevelConfig& coarsest = config.levels.back();
+  Encoder encoder;
+  encoder.config = config;
+  encoder.conv_in = nn::load_conv2d(weights, "conv_in", config.in_channels, finest, config.conv_in_kernel);
+  encoder.time_embedding = {nn::load_linear(weights, "time_embedding.linear_1", finest, time),
+                            nn::load_linear(weights, "time_embedding.linear_2", time, time)};
+  for (size_t i = 0; i < config.levels.size(); ++i)
+    encoder.down_blocks.push_back(load_down_block(weights, i, config));
+  encoder.mid_block = {
+      "mid_block",
+      load_unet_resnet(weights, "mid_block.resnets.0", coarsest.channels, coarsest.channels, config),
+      load_transformer(weights, "mid_block.attentions.0", coarsest, config),
+      load_unet_resnet(weights, "mid_block.resnets.1", coarsest.channels, coarsest.channels, config)};
+  return encoder;
+}
+
+at::Tensor Encoder::time(const at::Tensor& timesteps, const nn::Recorder& record) const {
+  const at::Tensor sinusoids =
+      timestep_embedding(timesteps.to(conv_in.weight.device()), config.levels.front().channels,
+                         config.flip_sin_to_cos, config.freq_shift);
+  const at::Tensor projected = record("time_proj", sinusoids).to(conv_in.weight.scalar_type());
+  const at::Tensor hidden = nn::silu(time_embedding.linear_1(projected, record));
+  return nn::silu(record("time_embedding", time_embedding.linear_2(hidden, record)));
+}
+
+Encoder::Outputs Encoder::operator()(const at::Tensor& x, const Conditions& conditions) const {
+  const nn::Recorder& record = conditions.record;
+  Outputs outputs{{x}, {}};
+  at::Tensor h = x;
+  for (const DownBlock& block : down_blocks) {
+    for (size_t i = 0; i < block.resnets.size(); ++i) {
+      h = block.resnets[i](h, conditions.time, record);
+      if (!block.attentions.empty()) h = block.attentions[i](h, conditions);
+      outputs.skips.push_back(h);
+    }
+    if (block.downsamplers_0) {
+      h = (*block.downsamplers_0)(h, record);
+      outputs.skips.push_back(h);
+    }
+    record(block.name, h);
+  }
+  h = mid_block.resnets_0(h, conditions.time, record);
+  h = mid_block.attentions_0(h, conditions);
+  outputs.mid = record(mid_block.name, mid_block.resnets_1(h, conditions.time, record));
+  return outputs;
+}
+
+UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.type()) {
+  encoder_ = load_encoder(weights, config);
+  for (size_t i = 0; i < config.levels.size(); ++i) up_blocks_.push_back(load_up_block(weights, i, config));
+  const int64_t finest = config.levels.front().channels;
+  conv_norm_out_ =
+      nn::load_group_norm(weights, "conv_norm_out", finest, config.norm_num_groups, config.norm_epsilon);
+  conv_out_ = nn::load_conv2d(weights, "conv_out", finest, config.out_channels, config.conv_out_kernel);
+  count_ = weights.count();
+}
+
+UNet::UNet(const std::filesystem::path& folder, at::ScalarType type)
+    : UNet(load_network<UNet>(open_unet(folder), type)) {}
+
+at::Tensor UNet::operator()(UNetInputs inputs, const nn::Recorder& record) const {
+  const UNetConfig& config = encoder_.config;
+  PATINA_CHECK_EQ(inputs.sample.dim(), 4);
+  PATINA_CHECK_EQ(inputs.sample.size(1), config.in_channels);
+  PATINA_CHECK_EQ(inputs.text.dim(), 3);
+
+  // Down, keeping every layer's output; ControlNets add to what was kept.
+  const c10::Device device = encoder_.conv_in.weight.device();
+  at::Tensor sample = inputs.sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
+  if (config.center_input_sample) sample = 2 * sample - 1;
+  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.to(device, type_),
+                              inputs.bias, record};
+  auto [skips, h] = encoder_(encoder_.conv_in(sample, record), conditions);
+  ControlResiduals& control = inputs.control;
+  if (control.mid.defined()) {
+    PATINA_CHECK_EQ(control.down.size(), skips.size());
+    for (size_t i = 0; i < skips.size(); ++i) {
+      skips[i] = skips[i] + control.down[i];
+      control.down[i].reset();
+    }
+    h = h + control.mid;
+  }
+
+  // Up, taking the kept outputs last first.
+  for (const UpBlock& block : up_blocks_) {
+    for (size_t i = 0; i < block.resnets.size(); ++i) {
+      h = at::cat({h, skips.back()}, 1);
+      skips.pop_back();
+      h = block.resnets[i](h, conditions.time, record);
+      if (!block.attentions.empty()) h = block.attentions[i](h, conditions);
+    }
+    // To the size of the next kept output, which is not twice this one where the way down rounded up.
+    if (block.upsamplers_0) h = (*block.upsamplers_0)(h, skips.back().size(2), skips.back().size(3), record);
+    record(block.name, h);
+  }
+  return conv_out_(conv_norm_out_.with_silu(h, record), record);
+}
+
+}  // namespace patina::diffusion
