@@ -19,8 +19,8 @@ using test::TinyGltf;
 
 constexpr float kQuantum = 0.51f / 255.0f;
 
-std::vector<ChangedMaps> no_change(const Asset& asset) {
-  return std::vector<ChangedMaps>(asset.materials.size());
+std::vector<MapSet> no_change(const Asset& asset) {
+  return std::vector<MapSet>(asset.materials.size());
 }
 
 // Largest difference of two linear colour maps after both are shown in sRGB, where an 8-bit file rounds.
@@ -68,7 +68,7 @@ TEST(Export, changed_base_colour_comes_back_and_all_else_stays) {
   auto maps = resolve_materials(asset);
   for (float& v : maps[0].base_color.texels.pixels) v = 1.0f - v;
   auto changed = no_change(asset);
-  changed[0].base_color = true;
+  changed[0].set(index_of(MapSlot::kBaseColor));
   for (const char* name : {"out.glb", "out.gltf"}) {
     export_asset(asset, maps, changed, folder.path() / name);
     const Asset again = read_asset(folder.path() / name);
@@ -98,7 +98,7 @@ TEST(Export, roughness_keeps_the_occlusion_and_metallic_packed_with_it) {
   auto maps = resolve_materials(asset);
   maps[0].roughness.texels = gradient_image(16, 16, 1, 5);  // finer than the image it is packed into
   auto changed = no_change(asset);
-  changed[0].roughness = true;
+  changed[0].set(index_of(MapSlot::kRoughness));
   export_asset(asset, maps, changed, folder.path() / "out.glb");
   const Asset again = read_asset(folder.path() / "out.glb");
   const auto found = resolve_materials(again);
@@ -123,7 +123,7 @@ TEST(Export, factors_stay_where_they_can) {
   auto maps = resolve_materials(asset);
   for (float& v : maps[0].base_color.texels.pixels) v *= 0.9f;
   auto changed = no_change(asset);
-  changed[0].base_color = true;
+  changed[0].set(index_of(MapSlot::kBaseColor));
   export_asset(asset, maps, changed, folder.path() / "darker.glb");
   const Asset darker = read_asset(folder.path() / "darker.glb");
   EXPECT_EQ(darker.materials[0].base_color_factor, vec4(0.5f, 0.25f, 1.0f, 0.75f));
@@ -147,7 +147,7 @@ TEST(Export, normals_come_back_under_the_old_scale) {
                 glm::normalize(
                     vec3(0.1f * static_cast<float>(x) - 0.15f, 0.1f * static_cast<float>(y) - 0.15f, 1.0f)));
   auto changed = no_change(asset);
-  changed[0].normal = true;
+  changed[0].set(index_of(MapSlot::kNormal));
   export_asset(asset, maps, changed, folder.path() / "out.glb");
   const Asset again = read_asset(folder.path() / "out.glb");
   EXPECT_EQ(again.materials[0].normal_scale, 0.5f);
@@ -167,7 +167,7 @@ TEST(Export, factor_only_materials_and_bare_primitives_get_textures) {
   maps[0].normal.texels = Image(4, 4, 3, 0.0f);
   for (int i = 0; i < 16; ++i)
     maps[0].normal.texels.set_rgb(i % 4, i / 4, glm::normalize(vec3(0.2f, -0.1f, 1.0f)));
-  std::vector<ChangedMaps> changed{{true, true, false, true}};
+  std::vector<MapSet> changed{set_of({MapSlot::kBaseColor, MapSlot::kRoughness, MapSlot::kNormal})};
   for (const char* name : {"out.glb", "out.gltf"}) {
     export_asset(asset, maps, changed, folder.path() / name);
     const Asset again = read_asset(folder.path() / name);
@@ -189,7 +189,7 @@ TEST(Export, an_image_that_another_material_uses_is_left_to_it) {
   auto maps = resolve_materials(asset);
   for (float& v : maps[0].base_color.texels.pixels) v = 0.5f * v;
   auto changed = no_change(asset);
-  changed[0].base_color = true;
+  changed[0].set(index_of(MapSlot::kBaseColor));
   export_asset(asset, maps, changed, folder.path() / "out.glb");
   const auto found = resolve_materials(read_asset(folder.path() / "out.glb"));
   EXPECT_LE(srgb_difference(found[0].base_color, maps[0].base_color), kQuantum);
@@ -210,7 +210,7 @@ TEST(Export, texture_transform_sampler_and_uv_set_are_kept) {
   const Asset asset = read_asset(g.write_glb(folder.path()));
   auto maps = resolve_materials(asset);
   auto changed = no_change(asset);
-  changed[0].base_color = true;
+  changed[0].set(index_of(MapSlot::kBaseColor));
   export_asset(asset, maps, changed, folder.path() / "kept.glb");
   const TextureRef kept = read_asset(folder.path() / "kept.glb").materials[0].base_color;
   EXPECT_EQ(kept.uv_set, 1);
@@ -262,7 +262,7 @@ TEST(Export, a_second_export_gives_the_same_bytes) {
   const TemporaryFolder folder;
   const Asset asset = read_asset(packed_quad().write_glb(folder.path()));
   auto maps = resolve_materials(asset);
-  std::vector<ChangedMaps> changed{{true, true, true, true}};
+  std::vector<MapSet> changed{MapSet().set()};
   export_asset(asset, maps, changed, folder.path() / "a.glb");
   export_asset(asset, maps, changed, folder.path() / "b.glb");
   EXPECT_EQ(read_file(folder.path() / "a.glb"), read_file(folder.path() / "b.glb"));
@@ -360,7 +360,7 @@ TEST(ExportObj, a_file_without_a_library_gets_one) {
   const Asset asset = read_asset(folder.path() / "bare.obj");
   auto maps = resolve_materials(asset);
   maps[0].base_color.texels = gradient_image(4, 4, 3);
-  export_asset(asset, maps, std::vector<ChangedMaps>{{true, false, false, false}}, folder.path() / "new.obj");
+  export_asset(asset, maps, std::vector<MapSet>{set_of({MapSlot::kBaseColor})}, folder.path() / "new.obj");
   const Asset again = read_asset(folder.path() / "new.obj");
   const auto found = resolve_materials(again);
   EXPECT_LE(srgb_difference(found[static_cast<size_t>(again.primitives[0].material)].base_color,

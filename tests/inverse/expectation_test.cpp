@@ -11,7 +11,7 @@
 namespace patina::test {
 namespace {
 
-using inverse::Slot;
+using asset::MapSlot;
 
 struct Moments {
   double sum = 0, squares = 0;
@@ -106,10 +106,10 @@ TEST(light_cache, gradient_agrees_with_path_replay) {
         const auto& slots = gradients.slots[m];
         moments[6 * m].add(slots[0].pixels[0]);
         moments[6 * m + 1].add(slots[0].pixels[2]);
-        moments[6 * m + 2].add(slots[static_cast<size_t>(Slot::kRoughness)].pixels[0]);
-        moments[6 * m + 3].add(slots[static_cast<size_t>(Slot::kMetallic)].pixels[0]);
-        moments[6 * m + 4].add(slots[static_cast<size_t>(Slot::kNormal)].pixels[0]);
-        moments[6 * m + 5].add(slots[static_cast<size_t>(Slot::kNormal)].pixels[1]);
+        moments[6 * m + 2].add(slots[index_of(MapSlot::kRoughness)].pixels[0]);
+        moments[6 * m + 3].add(slots[index_of(MapSlot::kMetallic)].pixels[0]);
+        moments[6 * m + 4].add(slots[index_of(MapSlot::kNormal)].pixels[0]);
+        moments[6 * m + 5].add(slots[index_of(MapSlot::kNormal)].pixels[1]);
       }
     };
     for (uint32_t generation = 0; generation < 24; ++generation) {

@@ -58,8 +58,8 @@ inverse::FitOptions quick() {
 std::vector<float> all_texels(const inverse::FitResult& result) {
   std::vector<float> values;
   for (const auto& maps : result.maps)
-    for (const auto slot : inverse::kSlots) {
-      const auto& pixels = inverse::slot_map(maps, slot).texels.pixels;
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      const auto& pixels = asset::slot_map(maps, row.slot).texels.pixels;
       values.insert(values.end(), pixels.begin(), pixels.end());
     }
   return values;
@@ -118,8 +118,8 @@ TEST(fit, finds_base_colour_from_one_view) {
     }
   EXPECT_GT(-10.0 * std::log10(error / count), result.psnr - 1.0f);
   ASSERT_EQ(static_cast<int>(result.loss.size()), kEnoughIterations);
-  EXPECT_TRUE(result.changed[0].base_color && result.changed[0].roughness && result.changed[0].normal);
-  EXPECT_FALSE(result.changed[0].metallic);
+  EXPECT_TRUE(result.changed[0] == asset::set_of({asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness,
+                                                  asset::MapSlot::kNormal}));
 }
 
 TEST(fit, finds_textures_that_lie_on_the_surface_twice_each_way_or_once) {
@@ -251,7 +251,7 @@ TEST(fit, changes_only_the_chosen_materials_and_maps) {
   const auto start = task.world.scene.materials();
   inverse::FitOptions options = quick();
   options.materials = {true, false};
-  options.fit_normal = false;
+  options.maps.set(index_of(asset::MapSlot::kNormal), false);
   const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
   EXPECT_NE(result.maps[0].base_color.texels.pixels, start[0].base_color.texels.pixels);
   EXPECT_EQ(result.maps[0].normal.texels.pixels, start[0].normal.texels.pixels);
@@ -299,22 +299,22 @@ TEST(fit, fills_surface_that_no_view_saw_with_the_change_beside_it_if_asked) {
   };
   const inverse::FitResult result = fitted(true);
   const asset::MaterialMaps filled = result.maps[0], kept = fitted(false).maps[0];
-  const auto mean_change = [&](const asset::MaterialMaps& maps, inverse::Slot slot, int from, int to) {
-    const Image start = asset::resized(inverse::slot_map(before[0], slot), 32, 32).texels;
-    const Image& end = inverse::slot_map(maps, slot).texels;
+  const auto mean_change = [&](const asset::MaterialMaps& maps, asset::MapSlot slot, int from, int to) {
+    const Image start = asset::resized(asset::slot_map(before[0], slot), 32, 32).texels;
+    const Image& end = asset::slot_map(maps, slot).texels;
     double sum = 0;
     for (int y = 8; y < 24; ++y)
       for (int x = from; x < to; ++x) sum += *end.at(x, y) - *start.at(x, y);
     return sum / (16 * (to - from));
   };
-  for (const auto slot : {inverse::Slot::kBaseColor, inverse::Slot::kRoughness}) {
+  for (const auto slot : {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness}) {
     const double seen = mean_change(filled, slot, 20, 30);
     EXPECT_GT(std::abs(seen), 0.003) << "the edit changes nothing here";
     for (size_t i = 0; i < result.evidence[0].pixels.size(); ++i) {
       if (result.evidence[0].pixels[i] < 0.5f) continue;
-      const auto channels = static_cast<size_t>(inverse::num_channels(slot));
-      EXPECT_EQ(inverse::slot_map(filled, slot).texels.pixels[channels * i],
-                inverse::slot_map(kept, slot).texels.pixels[channels * i])
+      const auto channels = static_cast<size_t>(asset::row_of(slot).channels);
+      EXPECT_EQ(asset::slot_map(filled, slot).texels.pixels[channels * i],
+                asset::slot_map(kept, slot).texels.pixels[channels * i])
           << "what is seen stays";
     }
     EXPECT_EQ(mean_change(kept, slot, 3, 8), 0.0);
@@ -371,8 +371,8 @@ TEST(fit, gives_slots_without_texture_one_that_the_views_resolve) {
   options.texture_size = 48;
   Task sized = make_task();
   const auto exact = inverse::fit_materials(sized.world.scene, sized.views, sized.edited, options, {}, {});
-  for (const auto slot : {inverse::Slot::kBaseColor, inverse::Slot::kRoughness, inverse::Slot::kNormal})
-    EXPECT_EQ(inverse::slot_map(exact.maps[0], slot).texels.width, 48);
+  for (const auto slot : {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal})
+    EXPECT_EQ(asset::slot_map(exact.maps[0], slot).texels.width, 48);
   EXPECT_EQ(exact.maps[0].metallic.texels.width, 8);
 }
 
@@ -517,9 +517,9 @@ TEST(texture_field, splatting_is_the_adjoint_of_sampling) {
   }
   double right = 0;
   for (size_t m = 0; m < 2; ++m)
-    for (const auto slot : inverse::kSlots) {
-      const Image& texels = inverse::slot_map(world.maps[m], slot).texels;
-      const Image& gradient = adjoint.slots[m][static_cast<size_t>(slot)];
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      const Image& texels = asset::slot_map(world.maps[m], row.slot).texels;
+      const Image& gradient = adjoint.slots[m][index_of(row.slot)];
       for (size_t i = 0; i < texels.pixels.size(); ++i)
         right += static_cast<double>(texels.pixels[i]) * gradient.pixels[i];
     }

@@ -9,6 +9,7 @@
 #include "patina/base/random.h"
 #include "patina/image/color.h"
 #include "patina/inverse/evaluate.h"
+#include "patina/inverse/fit_slots.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/path_replay.h"
 #include "patina/inverse/shade.h"
@@ -18,25 +19,25 @@
 namespace patina::test {
 namespace {
 
-using inverse::Slot;
+using asset::MapSlot;
 
 struct Parameter {
   const char* name;
-  Slot slot;
+  MapSlot slot;
   int channel;  // -1: all
 };
-constexpr Parameter kParameters[] = {{"base colour", Slot::kBaseColor, -1},
-                                     {"roughness", Slot::kRoughness, -1},
-                                     {"metallic", Slot::kMetallic, -1},
-                                     {"normal x", Slot::kNormal, 0},
-                                     {"normal y", Slot::kNormal, 1}};
+constexpr Parameter kParameters[] = {{"base colour", MapSlot::kBaseColor, -1},
+                                     {"roughness", MapSlot::kRoughness, -1},
+                                     {"metallic", MapSlot::kMetallic, -1},
+                                     {"normal x", MapSlot::kNormal, 0},
+                                     {"normal y", MapSlot::kNormal, 1}};
 
 // A fixed random direction in the space of one parameter's texels; material by material.
 using Direction = std::vector<std::vector<float>>;
 Direction direction_of(const std::vector<asset::MaterialMaps>& maps, const Parameter& parameter) {
   Direction direction;
   for (size_t m = 0; m < maps.size(); ++m) {
-    const Image& texels = inverse::slot_map(maps[m], parameter.slot).texels;
+    const Image& texels = asset::slot_map(maps[m], parameter.slot).texels;
     RandomStream random(11, RandomPurpose::kTest, m);
     auto& values = direction.emplace_back(texels.pixels.size());
     for (size_t i = 0; i < values.size(); ++i) {
@@ -49,7 +50,7 @@ Direction direction_of(const std::vector<asset::MaterialMaps>& maps, const Param
 std::vector<asset::MaterialMaps> moved(std::vector<asset::MaterialMaps> maps, const Parameter& parameter,
                                        const Direction& direction, float step) {
   for (size_t m = 0; m < maps.size(); ++m) {
-    Image& texels = inverse::slot_map(maps[m], parameter.slot).texels;
+    Image& texels = asset::slot_map(maps[m], parameter.slot).texels;
     for (size_t i = 0; i < texels.pixels.size(); ++i) texels.pixels[i] += step * direction[m][i];
   }
   return maps;
@@ -67,12 +68,12 @@ double derivative(const Function& f, float h) {
 // A normal's step is smaller: within it no light may cross the horizon of a shading normal, where the
 // derivative jumps.
 float step_of(const Parameter& parameter) {
-  return parameter.slot == Slot::kNormal ? 1e-3f : 1e-2f;
+  return parameter.slot == MapSlot::kNormal ? 1e-3f : 1e-2f;
 }
 // Of the sum of the sizes of all texels' shares. What is smooth in its parameter agrees to 5e-4; normals meet
 // horizons, where the derivative jumps, and the fourth-order difference leaves something.
 double relative_error(const Parameter& parameter) {
-  return parameter.slot == Slot::kNormal ? 5e-3 : 5e-4;
+  return parameter.slot == MapSlot::kNormal ? 5e-3 : 5e-4;
 }
 
 // `gradients` against central differences of value(maps), for every parameter. Returns how many were checked.
@@ -246,11 +247,11 @@ TEST(light_cache, gradients_of_a_real_asset_agree_texel_by_texel) {
   const std::vector<inverse::SeenPoint> seen = inverse::trace_seen_points(scene, views, cache.pixels);
 
   std::vector<inverse::FittedMap> fitted;
-  for (const Slot slot : {Slot::kBaseColor, Slot::kRoughness, Slot::kNormal}) {
-    const asset::Map& map = inverse::slot_map(maps[0], slot);
+  for (const MapSlot slot : {MapSlot::kBaseColor, MapSlot::kRoughness, MapSlot::kNormal}) {
+    const asset::Map& map = asset::slot_map(maps[0], slot);
     inverse::FittedMap& entry = fitted.emplace_back();
     entry.slot = slot;
-    entry.field = inverse::make_field(map, 64, 64, slot == Slot::kNormal ? 2 : inverse::num_channels(slot));
+    entry.field = inverse::make_field(map, 64, 64, inverse::fit_slot(slot).unknowns);
     entry.evidence = inverse::evidence_of(map, 64, 64, slot, 0, seen);
     entry.may_change = Image(64, 64, 1);
     std::fill(entry.may_change.pixels.begin(), entry.may_change.pixels.end(), 1.0f);

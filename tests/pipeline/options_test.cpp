@@ -59,8 +59,8 @@ TEST(Options, every_value_survives_a_round_trip_through_json) {
   apply_json(again, nlohmann::json::parse(to_json(config).dump()), "test");
   EXPECT_EQ(to_json(again), to_json(config));
   EXPECT_EQ(again.seed, 18446744073709551615u);
-  EXPECT_TRUE(again.fit.fit_metallic);
-  EXPECT_FALSE(again.fit.fit_roughness);
+  EXPECT_TRUE(has(again.fit.maps, asset::MapSlot::kMetallic));
+  EXPECT_FALSE(has(again.fit.maps, asset::MapSlot::kRoughness));
   EXPECT_TRUE(again.detail.bias_controlnet);
 }
 

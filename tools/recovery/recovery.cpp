@@ -72,7 +72,7 @@ std::vector<Image> views_of_texels(const render::Scene& scene, const Recovery& r
     const auto seen = inverse::trace_seen_points(scene, r.views, {begin, end});
     for (size_t m = 0; m < counts.size(); ++m) {
       const Image evidence = inverse::evidence_of(r.fit.maps[m].base_color, counts[m].width, counts[m].height,
-                                                  inverse::Slot::kBaseColor, static_cast<int>(m), seen);
+                                                  asset::MapSlot::kBaseColor, static_cast<int>(m), seen);
       for (size_t i = 0; i < evidence.pixels.size(); ++i) counts[m].pixels[i] += evidence.pixels[i] > 0.0f;
     }
     begin = end;
@@ -194,9 +194,9 @@ MapErrors map_errors(const Recovery& r, const std::vector<asset::MaterialMaps>& 
     };
     const asset::MaterialMaps& fitted = r.fit.maps[m];
     asset::MaterialMaps truth, maps;
-    for (const auto slot : inverse::kSlots) {
-      inverse::slot_map(truth, slot) = sized(inverse::slot_map(r.truth[m], slot), fitted.base_color);
-      inverse::slot_map(maps, slot) = sized(inverse::slot_map(all_maps[m], slot), fitted.base_color);
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      asset::slot_map(truth, row.slot) = sized(asset::slot_map(r.truth[m], row.slot), fitted.base_color);
+      asset::slot_map(maps, row.slot) = sized(asset::slot_map(all_maps[m], row.slot), fitted.base_color);
     }
     for (size_t i = 0; i < num_texels; ++i) {
       if (!counts(r, m, i, min_views)) continue;
@@ -278,17 +278,14 @@ Image texture_strip(const Recovery& r, int slot, int size) {
   const size_t m = seen_material(r);
   std::vector<Image> images;
   for (const auto* maps : {&r.truth, &r.start, &r.fit.maps}) {
-    const auto kind = static_cast<inverse::Slot>(slot);
-    const Image texels = asset::resized(inverse::slot_map((*maps)[m], kind), size, size).texels;
+    const auto kind = static_cast<asset::MapSlot>(slot);
+    const Image texels = asset::resized(asset::slot_map((*maps)[m], kind), size, size).texels;
+    const Image picture = asset::picture_of(texels, asset::row_of(kind).encoding);
     Image shown(size, size, 3);
     for (size_t i = 0; i < shown.num_pixels(); ++i)
-      for (size_t c = 0; c < 3; ++c) {
-        const float value =
-            texels.pixels[i * static_cast<size_t>(texels.channels) + (texels.channels == 3 ? c : 0)];
-        shown.pixels[3 * i + c] = kind == inverse::Slot::kNormal      ? 0.5f + 0.5f * value
-                                  : kind == inverse::Slot::kBaseColor ? srgb_from_linear(value)
-                                                                      : value;
-      }
+      for (size_t c = 0; c < 3; ++c)
+        shown.pixels[3 * i + c] =
+            picture.pixels[i * static_cast<size_t>(picture.channels) + (picture.channels == 3 ? c : 0)];
     images.push_back(std::move(shown));
   }
   return paste(images);

@@ -34,7 +34,7 @@ void append_u32(std::vector<uint8_t>& out, uint64_t value) {
 }  // namespace
 
 bool ExportRequest::any_changed() const {
-  return std::any_of(changed.begin(), changed.end(), [](const ChangedMaps& c) { return c.any(); });
+  return std::any_of(changed.begin(), changed.end(), [](const MapSet& c) { return c.any(); });
 }
 
 std::string SidecarFiles::add_texture(const std::string& material, const std::string& slot,
@@ -106,8 +106,8 @@ std::vector<uint8_t> glb_bytes(std::string_view json, std::span<const uint8_t> b
   return out;
 }
 
-void export_asset(const Asset& asset, std::span<const MaterialMaps> maps,
-                  std::span<const ChangedMaps> changed, const fs::path& path) {
+void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::span<const MapSet> changed,
+                  const fs::path& path) {
   PATINA_CHECK_EQ(maps.size(), asset.materials.size());
   PATINA_CHECK_EQ(changed.size(), asset.materials.size());
   PATINA_CHECK(asset.source != nullptr);

@@ -10,7 +10,7 @@ namespace patina::asset {
 struct ExportRequest {
   const Asset& asset;
   std::span<const MaterialMaps> maps;
-  std::span<const ChangedMaps> changed;
+  std::span<const MapSet> changed;
   std::filesystem::path path;
 
   bool any_changed() const;

@@ -129,7 +129,7 @@ class GltfExporter {
   void write_material(size_t i) {
     const Material& material = asset().materials[i];
     const MaterialMaps& maps = request_.maps[i];
-    const ChangedMaps& changed = request_.changed[i];
+    const MapSet& changed = request_.changed[i];
     const BakedMaterial out = baked(asset(), material, maps, changed);
     const bool is_new = i >= array_size(root_, "materials");
     const nlohmann::json old = is_new ? nlohmann::json::object() : root_["materials"][i];
@@ -146,8 +146,9 @@ class GltfExporter {
     }
     if (out.metallic_roughness) {
       JsonPatch& pbr = patch["pbrMetallicRoughness"];
-      const Map& map = changed.roughness ? maps.roughness : maps.metallic;
-      const bool one_only = changed.roughness != changed.metallic;
+      const bool has_roughness = has(changed, MapSlot::kRoughness);
+      const Map& map = has_roughness ? maps.roughness : maps.metallic;
+      const bool one_only = has_roughness != has(changed, MapSlot::kMetallic);
       if (one_only && material.metallic_roughness && !same_mapping(material.metallic_roughness, map))
         throw Error(ErrorCode::kUnsupported, request_.path.string(),
                     fmt::format("material '{}': roughness and metallic share one texture, so one of them "

@@ -44,7 +44,7 @@ using Statements = std::map<std::string, std::string>;
 Statements statements_of(const ExportRequest& request, size_t i, SidecarFiles& sidecars) {
   const Material& material = request.asset.materials[i];
   const MaterialMaps& maps = request.maps[i];
-  const ChangedMaps& changed = request.changed[i];
+  const MapSet& changed = request.changed[i];
   const BakedMaterial out = baked(request.asset, material, maps, changed);
   const std::string name = request.path.string();
   Statements statements;
@@ -57,11 +57,11 @@ Statements statements_of(const ExportRequest& request, size_t i, SidecarFiles& s
     const vec3& f = out.base_color_factor;
     statements["Kd"] = fmt::format("Kd {} {} {}", f.r, f.g, f.b);
   }
-  if (changed.roughness) {
+  if (has(changed, MapSlot::kRoughness)) {
     texture("map_Pr", "roughness", channel_of(*out.metallic_roughness, 1), maps.roughness);
     statements["Pr"] = fmt::format("Pr {}", out.roughness_factor);
   }
-  if (changed.metallic) {
+  if (has(changed, MapSlot::kMetallic)) {
     texture("map_Pm", "metallic", channel_of(*out.metallic_roughness, 2), maps.metallic);
     statements["Pm"] = fmt::format("Pm {}", out.metallic_factor);
   }
@@ -194,7 +194,7 @@ Json material_json(const ExportRequest& request, size_t i, GlbBuilder& builder) 
   const Asset& asset = request.asset;
   const Material& m = asset.materials[i];
   const MaterialMaps& maps = request.maps[i];
-  const ChangedMaps& changed = request.changed[i];
+  const MapSet& changed = request.changed[i];
   const BakedMaterial out = baked(asset, m, maps, changed);
   const auto image_of = [&](const TextureRef& ref) -> const Image& {
     return asset.images[static_cast<size_t>(ref.image)];
@@ -213,7 +213,7 @@ Json material_json(const ExportRequest& request, size_t i, GlbBuilder& builder) 
   if (out.metallic_roughness)
     pbr["metallicRoughnessTexture"] =
         texture_info(builder, *out.metallic_roughness, m.name + "_metallic_roughness",
-                     ref_of(changed.roughness ? maps.roughness : maps.metallic));
+                     ref_of(has(changed, MapSlot::kRoughness) ? maps.roughness : maps.metallic));
   else if (m.metallic_roughness)
     pbr["metallicRoughnessTexture"] = texture_info(builder, image_of(m.metallic_roughness),
                                                    m.name + "_metallic_roughness", m.metallic_roughness);

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <filesystem>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +37,24 @@ struct MaterialMaps {
   bool double_sided = false;
 };
 
+/// The maps that a fit may change and export may write, in the order of every table over them (map_slots.h).
+enum class MapSlot : uint8_t { kBaseColor, kRoughness, kMetallic, kNormal };
+inline constexpr size_t kNumMapSlots = 4;
+constexpr size_t index_of(MapSlot slot) {
+  return static_cast<size_t>(slot);
+}
+
+/// Some of these maps: those that a fit may change, those that it has changed and export shall write.
+using MapSet = std::bitset<kNumMapSlots>;
+constexpr MapSet set_of(std::initializer_list<MapSlot> slots) {
+  unsigned long long bits = 0;
+  for (const MapSlot slot : slots) bits |= 1ull << index_of(slot);
+  return MapSet(bits);
+}
+inline bool has(const MapSet& set, MapSlot slot) {
+  return set[index_of(slot)];
+}
+
 /// One entry a material of the asset, in order.
 std::vector<MaterialMaps> resolve_materials(const Asset& asset);
 
@@ -65,20 +85,14 @@ vec3 sample3(const Map& map, const vec2& uv_map);
 /// renormalised by the caller).
 Map resized(const Map& map, int width, int height);
 
-/// Which maps of a material were changed and shall be written.
-struct ChangedMaps {
-  bool base_color = false, roughness = false, metallic = false, normal = false;
-  bool any() const { return base_color || roughness || metallic || normal; }
-};
-
 /// Writes the asset with the changed maps of its materials to `path` (.glb, .gltf or .obj by extension;
 /// textures of .gltf and .obj beside it). maps and changed have one entry a material. Materials without a
 /// change, and every other byte of JSON and buffers (extensions, extras, animation, skins, names), are
 /// carried over as they were. Packed channels (occlusion), samplers, texture transforms and texCoord are
 /// kept; images shared with an unchanged slot are copied first. Atomic: the old file or the whole new one.
 /// Throws Error{kIo, kUnsupported}.
-void export_asset(const Asset& asset, std::span<const MaterialMaps> maps,
-                  std::span<const ChangedMaps> changed, const std::filesystem::path& path);
+void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::span<const MapSet> changed,
+                  const std::filesystem::path& path);
 
 /// What `patina info` tells of the UVs of one material; texel figures on a 1024² raster of the unit tile (UVs
 /// wrapped).

@@ -62,7 +62,7 @@ void bake_base_color(const Asset& asset, const Material& m, const Map& map, Bake
 }
 
 void bake_metallic_roughness(const Asset& asset, const Material& m, const MaterialMaps& maps,
-                             const ChangedMaps& changed, BakedMaterial& out) {
+                             const MapSet& changed, BakedMaterial& out) {
   const Image* old =
       m.metallic_roughness ? &asset.images[static_cast<size_t>(m.metallic_roughness.image)] : nullptr;
   int width = old ? old->width : 1, height = old ? old->height : 1;
@@ -70,9 +70,9 @@ void bake_metallic_roughness(const Asset& asset, const Material& m, const Materi
     width = std::max(width, map.texels.width);
     height = std::max(height, map.texels.height);
   };
-  if (changed.roughness) grow(maps.roughness);
-  if (changed.metallic) grow(maps.metallic);
-  const Map& like = changed.roughness ? maps.roughness : maps.metallic;
+  if (has(changed, MapSlot::kRoughness)) grow(maps.roughness);
+  if (has(changed, MapSlot::kMetallic)) grow(maps.metallic);
+  const Map& like = has(changed, MapSlot::kRoughness) ? maps.roughness : maps.metallic;
   const Image before = old ? resized_image(*old, like, width, height) : Image{};
   Image stored(width, height, old && old->channels == 4 ? 4 : 3, 1.0f);
   if (old)
@@ -89,8 +89,9 @@ void bake_metallic_roughness(const Asset& asset, const Material& m, const Materi
     return factor;
   };
   out.roughness_factor =
-      changed.roughness ? write(maps.roughness, 1, m.roughness_factor) : m.roughness_factor;
-  out.metallic_factor = changed.metallic ? write(maps.metallic, 2, m.metallic_factor) : m.metallic_factor;
+      has(changed, MapSlot::kRoughness) ? write(maps.roughness, 1, m.roughness_factor) : m.roughness_factor;
+  out.metallic_factor =
+      has(changed, MapSlot::kMetallic) ? write(maps.metallic, 2, m.metallic_factor) : m.metallic_factor;
   out.metallic_roughness = std::move(stored);
 }
 
@@ -112,11 +113,12 @@ void bake_normal(const Material& m, const Map& map, BakedMaterial& out) {
 }  // namespace
 
 BakedMaterial baked(const Asset& asset, const Material& material, const MaterialMaps& maps,
-                    const ChangedMaps& changed) {
+                    const MapSet& changed) {
   BakedMaterial out;
-  if (changed.base_color) bake_base_color(asset, material, maps.base_color, out);
-  if (changed.roughness || changed.metallic) bake_metallic_roughness(asset, material, maps, changed, out);
-  if (changed.normal) bake_normal(material, maps.normal, out);
+  if (has(changed, MapSlot::kBaseColor)) bake_base_color(asset, material, maps.base_color, out);
+  if (has(changed, MapSlot::kRoughness) || has(changed, MapSlot::kMetallic))
+    bake_metallic_roughness(asset, material, maps, changed, out);
+  if (has(changed, MapSlot::kNormal)) bake_normal(material, maps.normal, out);
   return out;
 }
 

@@ -22,6 +22,6 @@ struct BakedMaterial {
 /// one; else they become one. A slot that had no texture gets factor one, and the packed partner that was not
 /// changed keeps its factor under a channel of ones.
 BakedMaterial baked(const Asset& asset, const Material& material, const MaterialMaps& maps,
-                    const ChangedMaps& changed);
+                    const MapSet& changed);
 
 }  // namespace patina::asset

@@ -4,6 +4,7 @@
 
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
+#include "patina/inverse/fit_slots.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/shade.h"
 
@@ -24,16 +25,16 @@ using Overshoot = MapValues;
 void add_change(const FittedMap& map, const asset::BilinearTap& tap, float* value, float* overshoot) {
   const Image& delta = map.field.delta.texels;
   const auto channels = static_cast<size_t>(delta.channels);
-  const Range range = slot_range(map.slot);
+  const asset::MapSlotRow& row = asset::row_of(map.slot);
   const float* texel[4];
   for (size_t t = 0; t < 4; ++t)
     texel[t] = delta.pixels.data() + static_cast<size_t>(tap.texel[t]) * channels;
   for (size_t c = 0; c < channels; ++c) {
     const float change = tap.weight[0] * texel[0][c] + tap.weight[1] * texel[1][c] +
                          tap.weight[2] * texel[2][c] + tap.weight[3] * texel[3][c];
-    const float moved = stored_from_value(map.slot, value[c]) + change;
-    const float kept = std::clamp(moved, range.low, range.high);
-    value[c] = value_from_stored(map.slot, kept);
+    const float moved = asset::stored_from_value(row.stored, value[c]) + change;
+    const float kept = std::clamp(moved, row.low, row.high);
+    value[c] = asset::value_from_stored(row.stored, kept);
     overshoot[c] = moved - kept;
   }
 }
@@ -45,33 +46,17 @@ float bounded(float gradient, float overshoot, float weight) {
   const float inward = overshoot > 0.0f ? std::max(gradient, 0.0f) : std::min(gradient, 0.0f);
   return inward + weight * overshoot;
 }
-// From the map values to what the fitted maps store.
+// From the map values to what the fitted maps store. Normals have no bounds.
 void to_stored(MapGradient& gradient, const MapValues& values, const Overshoot& overshoot, float weight) {
-  for (int c = 0; c < 3; ++c) {
-    const float stored = stored_from_value(Slot::kBaseColor, values.base_color[c]);
-    gradient.base_color[c] = bounded(gradient.base_color[c] * d_value_d_stored(Slot::kBaseColor, stored),
-                                     overshoot.base_color[c], weight);
+  for (const asset::MapSlotRow& row : asset::kMapSlots) {
+    if (row.encoding == asset::MapEncoding::kNormal) continue;
+    float* g = values_of(gradient, row.slot);
+    const float *value = values_of(values, row.slot), *beyond = values_of(overshoot, row.slot);
+    for (int c = 0; c < row.channels; ++c) {
+      const float stored = asset::stored_from_value(row.stored, value[c]);
+      g[c] = bounded(g[c] * asset::d_value_d_stored(row.stored, stored), beyond[c], weight);
+    }
   }
-  gradient.roughness = bounded(gradient.roughness, overshoot.roughness, weight);
-  gradient.metallic = bounded(gradient.metallic, overshoot.metallic, weight);
-}
-
-const float* slot_gradient(const MapGradient& gradient, Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return &gradient.base_color.x;
-    case Slot::kRoughness:
-      return &gradient.roughness;
-    case Slot::kMetallic:
-      return &gradient.metallic;
-    case Slot::kNormal:
-      break;
-  }
-  return &gradient.normal.x;
-}
-
-float* slot_value(MapValues& values, Slot slot) {
-  return const_cast<float*>(slot_gradient(values, slot));
 }
 
 }  // namespace
@@ -85,11 +70,11 @@ Evaluator::Evaluator(std::span<const FittedMap> fitted, render::BsdfModel model,
     : fitted_(fitted), model_(model), gain_(gain) {
   size_t bytes = 1;
   for (const FittedMap& map : fitted) {
-    const auto m = static_cast<size_t>(map.material), s = static_cast<size_t>(map.slot);
+    const size_t m = static_cast<size_t>(map.material), s = index_of(map.slot);
     if (materials_.size() <= m) materials_.resize(m + 1);
     MaterialFields& fields = materials_[m];
     fields.map[s] = &map;
-    fields.layout[s] = static_cast<int>(s);
+    fields.layout[s] = s;
     for (size_t earlier = 0; earlier < s; ++earlier)
       if (fields.map[earlier] && asset::same_layout(fields.map[earlier]->field.delta, map.field.delta)) {
         fields.layout[s] = fields.layout[earlier];
@@ -106,14 +91,14 @@ Evaluator::CurrentValues Evaluator::current_values(const CacheSample& sample) co
   CurrentValues current{sample.base, zero_gradient()};
   if (sample.point.material >= materials_.size()) return current;
   const MaterialFields& fields = materials_[sample.point.material];
-  std::array<asset::BilinearTap, kNumSlots> taps;
-  for (const Slot slot : kSlots) {
-    const auto s = static_cast<size_t>(slot);
+  std::array<asset::BilinearTap, asset::kNumMapSlots> taps;
+  for (const asset::MapSlotRow& row : asset::kMapSlots) {
+    const size_t s = index_of(row.slot);
     if (!fields.map[s]) continue;
-    const auto layout = static_cast<size_t>(fields.layout[s]);
+    const size_t layout = fields.layout[s];
     if (layout == s) taps[s] = asset::bilinear_tap(fields.map[s]->field.delta, sample.point.uv[s]);
-    add_change(*fields.map[s], taps[layout], slot_value(current.values, slot),
-               slot_value(current.overshoot, slot));
+    add_change(*fields.map[s], taps[layout], values_of(current.values, row.slot),
+               values_of(current.overshoot, row.slot));
   }
   return current;
 }
@@ -173,26 +158,26 @@ void Evaluator::splat(const LightCache& cache) {
   const size_t num_parts = parts_.size() + 1, num_pixels = cache.pixels.size();
   std::vector<Task> tasks;
   for (size_t m = 0; m < materials_.size(); ++m)
-    for (size_t s = 0; s < kNumSlots; ++s)
-      if (materials_[m].layout[s] == static_cast<int>(s))
+    for (size_t s = 0; s < asset::kNumMapSlots; ++s)
+      if (materials_[m].map[s] && materials_[m].layout[s] == s)
         for (size_t part = 0; part < num_parts; ++part) tasks.push_back({part, static_cast<int>(m), s});
   parallel_for(0, static_cast<int64_t>(tasks.size()), 1, [&](int64_t begin, int64_t end) {
     for (auto at = static_cast<size_t>(begin); at < static_cast<size_t>(end); ++at) {
       const Task& task = tasks[at];
       const MaterialFields& fields = materials_[static_cast<size_t>(task.material)];
       struct Target {
-        Slot slot;
+        asset::MapSlot slot;
         float* sum;
         size_t channels;
       };
       std::vector<Target> targets;
-      for (const Slot slot : kSlots) {
-        const auto s = static_cast<size_t>(slot);
-        if (fields.layout[s] != static_cast<int>(task.layout)) continue;
+      for (const asset::MapSlotRow& row : asset::kMapSlots) {
+        const size_t s = index_of(row.slot);
+        if (!fields.map[s] || fields.layout[s] != task.layout) continue;
         const auto f = static_cast<size_t>(fields.map[s] - fitted_.data());
         Image& sum = task.part == 0 ? d_delta_[f] : parts_[task.part - 1][f];
         std::fill(sum.pixels.begin(), sum.pixels.end(), 0.0f);
-        targets.push_back({slot, sum.pixels.data(), static_cast<size_t>(sum.channels)});
+        targets.push_back({row.slot, sum.pixels.data(), static_cast<size_t>(sum.channels)});
       }
       const asset::Map& delta = fields.map[task.layout]->field.delta;
       const size_t first = num_pixels * task.part / num_parts,
@@ -202,7 +187,7 @@ void Evaluator::splat(const LightCache& cache) {
         if (!sample.hit || sample.point.material != task.material) continue;
         const asset::BilinearTap tap = asset::bilinear_tap(delta, sample.point.uv[task.layout]);
         for (const Target& target : targets) {
-          const float* gradient = slot_gradient(gradients_[i], target.slot);
+          const float* gradient = values_of(gradients_[i], target.slot);
           for (size_t t = 0; t < 4; ++t) {
             float* texel = target.sum + static_cast<size_t>(tap.texel[t]) * target.channels;
             for (size_t c = 0; c < target.channels; ++c) texel[c] += tap.weight[t] * gradient[c];

@@ -33,8 +33,8 @@ class Evaluator {
  private:
   // Fitted maps of one material by slot, and for each slot the first whose texels lie at the same places.
   struct MaterialFields {
-    std::array<const FittedMap*, kNumSlots> map{};
-    std::array<int, kNumSlots> layout{-1, -1, -1, -1};
+    std::array<const FittedMap*, asset::kNumMapSlots> map{};
+    std::array<size_t, asset::kNumMapSlots> layout{};
   };
   struct CurrentValues;
   CurrentValues current_values(const CacheSample& sample) const;

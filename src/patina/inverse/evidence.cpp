@@ -79,12 +79,12 @@ std::vector<SeenPoint> trace_seen_points(const render::Scene& scene, const views
   return points;
 }
 
-Image evidence_of(const asset::Map& map, int width, int height, Slot slot, int material,
+Image evidence_of(const asset::Map& map, int width, int height, asset::MapSlot slot, int material,
                   std::span<const SeenPoint> points) {
   asset::Map evidence = layout(map, width, height);
   for (const SeenPoint& seen : points) {
     if (seen.point.material != material) continue;
-    const asset::BilinearTap tap = asset::bilinear_tap(evidence, seen.point.uv[static_cast<size_t>(slot)]);
+    const asset::BilinearTap tap = asset::bilinear_tap(evidence, seen.point.uv[index_of(slot)]);
     for (size_t t = 0; t < 4; ++t)
       evidence.texels.pixels[static_cast<size_t>(tap.texel[t])] += seen.weight * tap.weight[t];
   }

@@ -27,7 +27,7 @@ std::vector<SeenPoint> trace_seen_points(const render::Scene& scene, const views
 
 /// Sum of weights with which the views see every texel of a width × height texture laid out as `map`.
 /// [height,width,1]
-Image evidence_of(const asset::Map& map, int width, int height, Slot slot, int material,
+Image evidence_of(const asset::Map& map, int width, int height, asset::MapSlot slot, int material,
                   std::span<const SeenPoint> points);
 
 /// The texels of a texture that some triangle of the material touches, and where on the surface they lie; of

@@ -12,6 +12,7 @@
 #include "patina/image/color.h"
 #include "patina/inverse/alignment.h"
 #include "patina/inverse/evaluate.h"
+#include "patina/inverse/fit_slots.h"
 #include "patina/inverse/fit_state.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/unseen.h"
@@ -27,43 +28,6 @@ using Clock = std::chrono::steady_clock;
 // give the pixel more points.
 constexpr int kCaches = 4;
 constexpr int kRefreshes = 36;
-// The prior on a fitted map. Each pyramid level holds detail of one size; `detail` is the cost of a texel's
-// squared coefficient at the finest level, in units of one fully weighted pixel's loss, a quarter of that a
-// level up, and so on: where the views say little, the smoother answer wins, while large areas move freely.
-// Coefficients far beyond `knee` cost only linearly, so that true edges stay sharp. `change` is the cost of
-// the squared change itself, which holds what the views leave undecided.
-struct Prior {
-  float detail, knee, change;
-};
-Prior prior_of(Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return {3.0f, 0.05f, 1e-3f};
-    case Slot::kRoughness:
-      return {2.0f, 0.1f, 2e-3f};
-    case Slot::kMetallic:
-      return {0.2f, 0.1f, 1e-3f};
-    case Slot::kNormal:
-      break;
-  }
-  return {16.0f, 0.1f, 6.0f};
-}
-
-// Maps join one after the other, at these shares of the iterations: while a colour is far too bright, a
-// smoother or tilted surface also darkens it, and roughness would run into a mirror from which no gradient
-// leads back.
-float start_of(Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return 0.0f;
-    case Slot::kRoughness:
-    case Slot::kMetallic:
-      return 0.05f;
-    case Slot::kNormal:
-      break;
-  }
-  return 0.15f;
-}
 
 // The first fiftieth of the iterations moves levels from a quarter of the finest size down, the second from
 // a half, the rest all.
@@ -77,19 +41,6 @@ constexpr std::array<int, 4> kAlignments{15, 22, 30, 40};
 // Bounds of the size that a map gets from what the views resolve.
 constexpr int kMinResolvedSize = 16, kMaxResolvedSize = 2048;
 
-bool is_chosen(const FitOptions& options, Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return options.fit_base_color;
-    case Slot::kRoughness:
-      return options.fit_roughness;
-    case Slot::kMetallic:
-      return options.fit_metallic;
-    case Slot::kNormal:
-      break;
-  }
-  return options.fit_normal;
-}
 bool is_chosen(const FitOptions& options, int material) {
   return options.materials.empty() || options.materials[static_cast<size_t>(material)];
 }
@@ -139,12 +90,12 @@ std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const
                                         scene.materials().begin() + scene.num_asset_materials());
   for (int m = 0; m < scene.num_asset_materials(); ++m) {
     if (!is_chosen(options, m)) continue;
-    for (const Slot slot : kSlots) {
-      if (!is_chosen(options, slot)) continue;
-      asset::Map& map = slot_map(maps[static_cast<size_t>(m)], slot);
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      if (!has(options.maps, row.slot)) continue;
+      asset::Map& map = slot_map(maps[static_cast<size_t>(m)], row.slot);
       const ivec2 size = enlarged_size(scene, views, pixels, options, m, map);
       map = asset::resized(map, size.x, size.y);
-      if (slot == Slot::kNormal)
+      if (row.encoding == asset::MapEncoding::kNormal)
         for (size_t i = 0; i < map.texels.num_pixels(); ++i) {
           float* texel = map.texels.pixels.data() + 3 * i;
           const vec3 n = glm::normalize(vec3(texel[0], texel[1], texel[2]));
@@ -178,8 +129,9 @@ std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views:
   std::vector<FittedMap> fitted;
   for (int m = 0; m < scene.num_asset_materials(); ++m) {
     if (!is_chosen(options, m)) continue;
-    for (const Slot slot : kSlots) {
-      if (!is_chosen(options, slot)) continue;
+    for (const FitSlot& row : kFitSlots) {
+      const asset::MapSlot slot = row.slot;
+      if (!has(options.maps, slot)) continue;
       const asset::Map& map = slot_map(scene.materials()[static_cast<size_t>(m)], slot);
       const float across = texels_per_pixel(scene, views, pixels, map, m);
       if (!(across > 0.0f)) continue;  // not seen, or without UVs
@@ -191,7 +143,7 @@ std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views:
       entry.material = m;
       entry.slot = slot;
       entry.texels_per_pixel = across;
-      entry.field = make_field(map, width, height, slot == Slot::kNormal ? 2 : num_channels(slot));
+      entry.field = make_field(map, width, height, row.unknowns);
       entry.evidence = evidence_of(map, width, height, slot, m, seen);
       entry.may_change = changeable(entry.evidence, surface_texels(scene, map, width, height, m).covered);
       fitted.push_back(std::move(entry));
@@ -205,21 +157,6 @@ int finest_level(const FitState& state, const FittedMap& map, int iterations) {
   return std::min(std::max(0, kCoarseLevels - stage), static_cast<int>(map.field.levels.size()) - 1);
 }
 
-// Shares of the learning rate. What renders hardly depend on, or depend on through noise, must walk slowly:
-// Adam takes steps of one size whether the gradient is signal or noise.
-float rate_of(Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return 1.0f;
-    case Slot::kRoughness:
-    case Slot::kMetallic:
-      return 0.35f;
-    case Slot::kNormal:
-      break;
-  }
-  return 0.07f;
-}
-
 // A cosine from full speed down to a fiftieth: the last iterations average the noise out.
 float learning_rate(const FitOptions& options, int iteration) {
   const float t = static_cast<float>(iteration) / static_cast<float>(std::max(1, options.iterations));
@@ -227,7 +164,7 @@ float learning_rate(const FitOptions& options, int iteration) {
 }
 
 void add_prior(const FittedMap& map, std::vector<Image>& gradients) {
-  const Prior prior = prior_of(map.slot);
+  const Prior& prior = fit_slot(map.slot).prior;
   float detail = prior.detail;
   for (size_t level = 0; level < gradients.size(); ++level, detail *= 0.25f) {
     const std::vector<float>& values = map.field.levels[level].pixels;
@@ -244,19 +181,19 @@ void step(FitState& state, std::vector<Image>& d_delta, const FitOptions& option
   const float progress =
       static_cast<float>(state.next_iteration) / static_cast<float>(std::max(1, options.iterations));
   float first_start = 1.0f;
-  for (const FittedMap& map : state.fitted) first_start = std::min(first_start, start_of(map.slot));
+  for (const FittedMap& map : state.fitted) first_start = std::min(first_start, fit_slot(map.slot).start);
   for (size_t f = 0; f < state.fitted.size(); ++f) {
     FittedMap& map = state.fitted[f];
-    if (progress + first_start < start_of(map.slot)) continue;
+    if (progress + first_start < fit_slot(map.slot).start) continue;
     Image& gradient = d_delta[f];
-    const float change = prior_of(map.slot).change;
+    const float change = fit_slot(map.slot).prior.change;
     for (size_t i = 0; i < gradient.pixels.size(); ++i)
       gradient.pixels[i] += change * map.field.delta.texels.pixels[i];
     std::vector<Image> gradients = restrict_to_levels(map.field, gradient);
     add_prior(map, gradients);
     AdamOptions adam;
     // Levels add up: with all of them in step, a texel moves at twice the rate that was asked for.
-    adam.learning_rate = rate_of(map.slot) * 2.0f * learning_rate(options, state.next_iteration) /
+    adam.learning_rate = fit_slot(map.slot).rate * 2.0f * learning_rate(options, state.next_iteration) /
                          static_cast<float>(gradients.size());
     adam_step(map.field, gradients, finest_level(state, map, options.iterations), adam);
   }
@@ -328,11 +265,10 @@ float psnr_of(const LightCache& cache, std::span<const vec3> radiance, float gai
   return static_cast<float>(mean > 0 ? -10.0 * std::log10(mean) : 100.0);
 }
 
-// Lets the change of every map go on over texels that no view saw. Normals stay: tangent frames turn from
-// place to place, and what is smooth says nothing about them.
+// Lets the change of the maps that do so go on over texels that no view saw.
 void fill_unseen(const render::Scene& scene, FitState& state) {
   for (FittedMap& map : state.fitted) {
-    if (map.slot == Slot::kNormal) continue;
+    if (!fit_slot(map.slot).fills_unseen) continue;
     Image& delta = map.field.delta.texels;
     const SurfaceTexels surface =
         surface_texels(scene, map.field.delta, delta.width, delta.height, map.material);
@@ -355,28 +291,13 @@ FitResult result_of(const render::Scene& scene, FitState& state, const std::vect
   }
   for (const FittedMap& map : state.fitted) {
     const auto m = static_cast<size_t>(map.material);
-    asset::ChangedMaps& changed = result.changed[m];
-    switch (map.slot) {
-      case Slot::kBaseColor: {
-        changed.base_color = true;
-        result.density.push_back(
-            {map.material, result.evidence[m].width, result.evidence[m].height, map.texels_per_pixel});
-        asset::Map evidence = map.field.delta;
-        evidence.texels = map.evidence;
-        result.evidence[m] =
-            asset::resized(evidence, result.evidence[m].width, result.evidence[m].height).texels;
-        break;
-      }
-      case Slot::kRoughness:
-        changed.roughness = true;
-        break;
-      case Slot::kMetallic:
-        changed.metallic = true;
-        break;
-      case Slot::kNormal:
-        changed.normal = true;
-        break;
-    }
+    result.changed[m].set(index_of(map.slot));
+    if (map.slot != asset::MapSlot::kBaseColor) continue;
+    result.density.push_back(
+        {map.material, result.evidence[m].width, result.evidence[m].height, map.texels_per_pixel});
+    asset::Map evidence = map.field.delta;
+    evidence.texels = map.evidence;
+    result.evidence[m] = asset::resized(evidence, result.evidence[m].width, result.evidence[m].height).texels;
   }
   if (options.fill_unseen) fill_unseen(scene, state);
   result.maps = apply_changes(base, state.fitted, Padding::kIslands);

@@ -21,7 +21,8 @@ struct FitOptions {
   int iterations = 200;
   int texture_size = 0;  // texels a side of fitted maps; 0: the asset's own size, or what the views resolve
                          // for factor-only slots; kAutoTextureSize
-  bool fit_base_color = true, fit_roughness = true, fit_normal = true, fit_metallic = false;
+  asset::MapSet maps = asset::set_of(
+      {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal});  // that may change
   std::vector<bool> materials;  // which materials may change; empty: all of the asset
   float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
   int light_samples = 8;        // incident directions kept a pixel
@@ -47,7 +48,7 @@ struct MapDensity {
 
 struct FitResult {
   std::vector<asset::MaterialMaps> maps;  // one entry a material of the asset
-  std::vector<asset::ChangedMaps> changed;
+  std::vector<asset::MapSet> changed;
   std::vector<float> loss;  // per iteration
   float psnr = 0;           // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
   std::vector<MapDensity> density;  // of base colours, one a material that was fitted

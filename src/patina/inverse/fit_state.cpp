@@ -50,19 +50,6 @@ void each_parameter(Archive&& archive, auto& parameters) {
 
 }  // namespace
 
-Range slot_range(Slot slot) {
-  switch (slot) {
-    case Slot::kRoughness:
-      return {0.03f, 1.0f};  // below, GGX lobes are narrower than float or views resolve
-    case Slot::kNormal:
-      return {-1e30f, 1e30f};
-    case Slot::kBaseColor:
-    case Slot::kMetallic:
-      break;
-  }
-  return {0.0f, 1.0f};
-}
-
 std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::MaterialMaps>& base,
                                                std::span<const FittedMap> fitted, Padding padding) {
   std::vector<asset::MaterialMaps> maps = base;
@@ -76,7 +63,7 @@ std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::Material
 
     Image& texels = slot_map(maps[static_cast<size_t>(map.material)], map.slot).texels;
     change = asset::resized(change, texels.width, texels.height);
-    const Range range = slot_range(map.slot);
+    const asset::MapSlotRow& row = asset::row_of(map.slot);
     const int fitted_channels = change.texels.channels;
     parallel_for(0, static_cast<int64_t>(texels.num_pixels()), 4096, [&](int64_t begin, int64_t end) {
       for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
@@ -84,12 +71,12 @@ std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::Material
         const float* delta = change.texels.pixels.data() + i * static_cast<size_t>(fitted_channels);
         if (std::all_of(delta, delta + fitted_channels, [](float d) { return d == 0.0f; })) continue;
         for (int c = 0; c < fitted_channels; ++c) {
-          const float stored = stored_from_value(map.slot, texel[c]) + delta[c];
+          const float stored = asset::stored_from_value(row.stored, texel[c]) + delta[c];
           // The bounds survive the way there and back only up to rounding.
-          const float value = value_from_stored(map.slot, std::clamp(stored, range.low, range.high));
-          texel[c] = map.slot == Slot::kBaseColor ? std::clamp(value, 0.0f, 1.0f) : value;
+          const float value = asset::value_from_stored(row.stored, std::clamp(stored, row.low, row.high));
+          texel[c] = row.stored == asset::StoredAs::kRoot ? std::clamp(value, row.low, row.high) : value;
         }
-        if (map.slot == Slot::kNormal) {
+        if (row.encoding == asset::MapEncoding::kNormal) {
           const vec3 n = glm::normalize(vec3(texel[0], texel[1], texel[2]));
           texel[0] = n.x, texel[1] = n.y, texel[2] = n.z;
         }

@@ -17,33 +17,13 @@ namespace patina::inverse {
 /// One fitted map of one material.
 struct FittedMap {
   int material = 0;
-  Slot slot = Slot::kBaseColor;
+  asset::MapSlot slot = asset::MapSlot::kBaseColor;
   TextureField field;
   float texels_per_pixel = 0;  // of the map at its full size
   Image evidence;              // [h,w,1] at the field's size: weight with which views saw the texel
   Image may_change;  // [h,w,1] 1: seen, beside a seen texel, or used by no surface (padding); 0: surface that
                      // no view saw
 };
-
-/// Bounds of what each map stores; a normal's components are unbounded.
-struct Range {
-  float low, high;
-};
-Range slot_range(Slot slot);
-
-/// Changes are added to a map's values as a fitted map stores them. Base colour is stored as √(value + 0.01),
-/// so that a step means about as much to the eye in the dark as in the light, and black can still become
-/// lighter; the others are stored as they are.
-inline constexpr float kBaseColorOffset = 0.01f;
-inline float stored_from_value(Slot slot, float value) {
-  return slot == Slot::kBaseColor ? std::sqrt(std::max(value, 0.0f) + kBaseColorOffset) : value;
-}
-inline float value_from_stored(Slot slot, float stored) {
-  return slot == Slot::kBaseColor ? stored * stored - kBaseColorOffset : stored;
-}
-inline float d_value_d_stored(Slot slot, float stored) {
-  return slot == Slot::kBaseColor ? 2.0f * stored : 1.0f;
-}
 
 /// `base` with every fitted map's change added, clamped, normals renormalised. Texels that must not change
 /// keep base's exact value. kIslands: the change goes on beyond the texels that the views saw, so that no mip

@@ -1,36 +1,19 @@
 #include "patina/inverse/material_point.h"
 
+#include "patina/inverse/fit_slots.h"
 #include "patina/render/shading_normal.h"
 
 namespace patina::inverse {
-
-asset::Map& slot_map(asset::MaterialMaps& maps, Slot slot) {
-  switch (slot) {
-    case Slot::kBaseColor:
-      return maps.base_color;
-    case Slot::kRoughness:
-      return maps.roughness;
-    case Slot::kMetallic:
-      return maps.metallic;
-    case Slot::kNormal:
-      break;
-  }
-  return maps.normal;
-}
-
-const asset::Map& slot_map(const asset::MaterialMaps& maps, Slot slot) {
-  return slot_map(const_cast<asset::MaterialMaps&>(maps), slot);
-}
 
 MaterialPoint material_point(const render::SurfacePoint& surface, const vec3& wo,
                              const asset::MaterialMaps& maps) {
   MaterialPoint point;
   point.material = static_cast<uint16_t>(surface.material);
-  for (const Slot slot : kSlots) {
-    const asset::Map& map = slot_map(maps, slot);
+  for (const asset::MapSlotRow& row : asset::kMapSlots) {
+    const asset::Map& map = maps.*row.map;
     const auto set = static_cast<size_t>(map.uv_set);
     const vec2 uv = set < surface.num_uv_sets && set < surface.uv.size() ? surface.uv[set] : vec2(0.0f);
-    point.uv[static_cast<size_t>(slot)] = asset::map_uv(map, uv);
+    point.uv[index_of(row.slot)] = asset::map_uv(map, uv);
   }
   point.vertex_color = surface.vertex_color;
   point.tangent = surface.tangent;
@@ -45,18 +28,21 @@ MapValues sample_maps(const asset::MaterialMaps& maps, const MaterialPoint& poin
   const asset::Map* last = nullptr;
   vec2 last_uv(0.0f);
   asset::BilinearTap tap{};
-  const auto tap_of = [&](Slot slot) -> const asset::BilinearTap& {
-    const asset::Map& map = slot_map(maps, slot);
-    const vec2& uv = point.uv[static_cast<size_t>(slot)];
+  MapValues values;
+  for (const asset::MapSlotRow& row : asset::kMapSlots) {
+    const asset::Map& map = maps.*row.map;
+    const vec2& uv = point.uv[index_of(row.slot)];
+    // One tap serves neighbouring slots that lie alike.
     if (!last || uv != last_uv || !asset::same_layout(*last, map)) tap = asset::bilinear_tap(map, uv);
     last = &map, last_uv = uv;
-    return tap;
-  };
-  MapValues values;
-  values.base_color = asset::read3(maps.base_color, tap_of(Slot::kBaseColor));
-  values.roughness = asset::read1(maps.roughness, tap_of(Slot::kRoughness));
-  values.metallic = asset::read1(maps.metallic, tap_of(Slot::kMetallic));
-  values.normal = asset::read3(maps.normal, tap_of(Slot::kNormal));
+    float* value = values_of(values, row.slot);
+    if (row.channels == 1) {
+      *value = asset::read1(map, tap);
+    } else {
+      const vec3 three = asset::read3(map, tap);
+      value[0] = three.x, value[1] = three.y, value[2] = three.z;
+    }
+  }
   return values;
 }
 
@@ -92,9 +78,9 @@ TexelGradients zero_gradients(const std::vector<asset::MaterialMaps>& maps, int 
   TexelGradients gradients;
   gradients.slots.resize(static_cast<size_t>(num_materials));
   for (size_t m = 0; m < gradients.slots.size(); ++m)
-    for (const Slot slot : kSlots) {
-      const Image& texels = slot_map(maps[m], slot).texels;
-      gradients.slots[m][static_cast<size_t>(slot)] = Image(texels.width, texels.height, texels.channels);
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      const Image& texels = (maps[m].*row.map).texels;
+      gradients.slots[m][index_of(row.slot)] = Image(texels.width, texels.height, texels.channels);
     }
   return gradients;
 }
@@ -103,18 +89,15 @@ void splat(TexelGradients& texels, const asset::MaterialMaps& maps, const Materi
            const MapGradient& gradient) {
   // Context materials lie behind the asset's: they have no gradients.
   if (point.material >= texels.slots.size()) return;
-  for (const Slot slot : kSlots) {
-    const auto s = static_cast<size_t>(slot);
+  for (const asset::MapSlotRow& row : asset::kMapSlots) {
+    const size_t s = index_of(row.slot);
     Image& image = texels.slots[point.material][s];
-    const asset::BilinearTap tap = asset::bilinear_tap(slot_map(maps, slot), point.uv[s]);
-    const float values[kNumSlots][3] = {{gradient.base_color.x, gradient.base_color.y, gradient.base_color.z},
-                                        {gradient.roughness, 0, 0},
-                                        {gradient.metallic, 0, 0},
-                                        {gradient.normal.x, gradient.normal.y, gradient.normal.z}};
+    const asset::BilinearTap tap = asset::bilinear_tap(maps.*row.map, point.uv[s]);
+    const float* values = values_of(gradient, row.slot);
     for (size_t t = 0; t < 4; ++t)
       for (int c = 0; c < image.channels; ++c)
         image.pixels[static_cast<size_t>(tap.texel[t]) * static_cast<size_t>(image.channels) +
-                     static_cast<size_t>(c)] += tap.weight[t] * values[s][c];
+                     static_cast<size_t>(c)] += tap.weight[t] * values[c];
   }
 }
 

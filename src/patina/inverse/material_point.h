@@ -6,24 +6,13 @@
 #include <array>
 #include <vector>
 
-#include "patina/asset/material_maps.h"
+#include "patina/asset/map_slots.h"
 #include "patina/render/scene.h"
 
 namespace patina::inverse {
 
-/// The maps that can be fitted, in the order of every array over slots.
-enum class Slot { kBaseColor, kRoughness, kMetallic, kNormal };
-inline constexpr int kNumSlots = 4;
-inline constexpr std::array<Slot, kNumSlots> kSlots{Slot::kBaseColor, Slot::kRoughness, Slot::kMetallic,
-                                                    Slot::kNormal};
-constexpr int num_channels(Slot slot) {
-  return slot == Slot::kBaseColor || slot == Slot::kNormal ? 3 : 1;
-}
-
-asset::Map& slot_map(asset::MaterialMaps& maps, Slot slot);
-const asset::Map& slot_map(const asset::MaterialMaps& maps, Slot slot);
-
-/// Bilinear values of the four maps. `normal` is the interpolated tangent-space vector, not normalised.
+/// Bilinear values of the maps that can be fitted. `normal` is the interpolated tangent-space vector, not
+/// normalised.
 struct MapValues {
   vec3 base_color{0.0f};
   float roughness = 0;
@@ -34,7 +23,7 @@ struct MapValues {
 /// The part of a surface point that no texture changes.
 struct MaterialPoint {
   uint16_t material = 0;
-  std::array<vec2, kNumSlots> uv{};  // map_uv of each slot
+  std::array<vec2, asset::kNumMapSlots> uv{};  // map_uv of each slot
   vec3 vertex_color{1.0f};
   vec3 tangent{1, 0, 0}, bitangent{0, 1, 0}, n_interpolated{0, 0, 1};
   vec3 n_geometric{0, 0, 1};
@@ -67,7 +56,7 @@ MapGradient map_gradient(const MaterialPoint& point, const Shading& shading, con
 
 /// Gradients over all texels of the asset's materials: same shapes as the maps.
 struct TexelGradients {
-  std::vector<std::array<Image, kNumSlots>> slots;  // [material][slot]
+  std::vector<std::array<Image, asset::kNumMapSlots>> slots;  // [material][slot]
 };
 TexelGradients zero_gradients(const std::vector<asset::MaterialMaps>& maps, int num_materials);
 

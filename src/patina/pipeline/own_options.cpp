@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "patina/asset/map_slots.h"
 #include "patina/pipeline/option_kinds.h"
 
 namespace patina::pipeline {
@@ -224,30 +225,20 @@ Option fit_option() {
       .is_list = true};
   const Option named = option;
   option.set = [named](Config& c, Values v) {
-    inverse::FitOptions& fit = c.fit;
-    fit.fit_base_color = fit.fit_roughness = fit.fit_normal = fit.fit_metallic = false;
+    c.fit.maps.reset();
     for (const std::string& list : v)
       for (size_t begin = 0, end; begin <= list.size(); begin = end + 1) {
         end = std::min(list.find(',', begin), list.size());
         const std::string name = list.substr(begin, end - begin);
-        if (name == "base_color")
-          fit.fit_base_color = true;
-        else if (name == "roughness")
-          fit.fit_roughness = true;
-        else if (name == "normal")
-          fit.fit_normal = true;
-        else if (name == "metallic")
-          fit.fit_metallic = true;
-        else
-          refuse(named, "base_color, roughness, normal or metallic", name);
+        const auto slot = asset::find_map_slot(name);
+        if (!slot) refuse(named, "base_color, roughness, normal or metallic", name);
+        c.fit.maps.set(index_of(slot->slot));
       }
   };
   option.get = [](const Config& c) {
     json list = json::array();
-    if (c.fit.fit_base_color) list.push_back("base_color");
-    if (c.fit.fit_roughness) list.push_back("roughness");
-    if (c.fit.fit_normal) list.push_back("normal");
-    if (c.fit.fit_metallic) list.push_back("metallic");
+    for (const asset::MapSlotRow& row : asset::kMapSlots)
+      if (has(c.fit.maps, row.slot)) list.push_back(row.name);
     return list;
   };
   return option;

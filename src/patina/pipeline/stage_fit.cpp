@@ -1,13 +1,11 @@
 // The third stage: inverse rendering carries the edit into the texture maps.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cctype>
 
+#include "patina/asset/map_slots.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/image/color.h"
 #include "patina/image/image_io.h"
 #include "patina/inverse/fit.h"
 #include "patina/pipeline/options.h"
@@ -16,52 +14,12 @@
 
 namespace patina::pipeline {
 
-using asset::ChangedMaps;
-using asset::Map;
-using asset::MaterialMaps;
 using nlohmann::json;
 
 namespace {
 
-// The maps that a fit may change: their names in files, where they stand, and how they are stored.
-enum class Encoding { kSrgb, kLinear, kNormal };
-struct Slot {
-  const char* name;
-  Map MaterialMaps::*map;
-  bool ChangedMaps::*changed;
-  Encoding encoding;
-};
-constexpr std::array<Slot, 4> kSlots = {{
-    {"base_color", &MaterialMaps::base_color, &ChangedMaps::base_color, Encoding::kSrgb},
-    {"roughness", &MaterialMaps::roughness, &ChangedMaps::roughness, Encoding::kLinear},
-    {"metallic", &MaterialMaps::metallic, &ChangedMaps::metallic, Encoding::kLinear},
-    {"normal", &MaterialMaps::normal, &ChangedMaps::normal, Encoding::kNormal},
-}};
-
 // Below this many texels a pixel the user is told that a larger texture would hold more.
 constexpr float kTooCoarse = 0.5f;
-
-Image to_picture(const Image& texels, Encoding encoding) {
-  if (encoding == Encoding::kSrgb) return srgb_from_linear(texels);
-  Image picture = texels;
-  if (encoding == Encoding::kNormal)
-    for (float& value : picture.pixels) value = 0.5f + 0.5f * value;
-  return picture;
-}
-
-Image to_texels(const Image& picture, Encoding encoding) {
-  if (encoding == Encoding::kSrgb) return linear_from_srgb(picture);
-  Image texels = picture;
-  if (encoding == Encoding::kNormal)
-    for (size_t i = 0; i < texels.num_pixels(); ++i) {
-      float* p = texels.pixels.data() + 3 * i;
-      vec3 n = 2.0f * vec3(p[0], p[1], p[2]) - 1.0f;
-      n.z = std::max(n.z, 1e-3f);  // a painted-over texel may point into the surface
-      n = glm::normalize(n);
-      p[0] = n.x, p[1] = n.y, p[2] = n.z;
-    }
-  return texels;
-}
 
 // A material's name as part of a file name: letters, digits, '-', '_'; numbered, so that two materials never
 // share a file.
@@ -85,10 +43,11 @@ WrittenMaps write_maps(const inverse::FitResult& fitted, const Workbench& bench,
                        const char* folder) {
   WrittenMaps written;
   for (size_t m = 0; m < fitted.maps.size(); ++m)
-    for (const Slot& slot : kSlots) {
-      if (!(fitted.changed[m].*slot.changed)) continue;
+    for (const asset::MapSlotRow& slot : asset::kMapSlots) {
+      if (!has(fitted.changed[m], slot.slot)) continue;
       const std::string file = texture_file(folder, m, bench.maps[m].name, slot.name);
-      write_image(run.file(file), to_picture((fitted.maps[m].*slot.map).texels, slot.encoding));
+      write_image(run.file(file),
+                  asset::picture_of(slot_map(fitted.maps[m], slot.slot).texels, slot.encoding));
       written.files.push_back(file);
       written.entries.push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
     }
@@ -169,18 +128,16 @@ FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run) {
   if (!stage)
     throw Error(ErrorCode::kNotFound, run.path().string(),
                 "has no fitted textures yet; run `patina fit` on it first");
-  FittedMaterials fitted{.maps = bench.maps, .changed = std::vector<ChangedMaps>(bench.maps.size())};
+  FittedMaterials fitted{.maps = bench.maps, .changed = std::vector<asset::MapSet>(bench.maps.size())};
   for (const json& entry : stage->metrics.at("maps")) {
     const size_t m = entry.at("material");
-    const auto slot =
-        std::find_if(kSlots.begin(), kSlots.end(), [&](const Slot& s) { return entry.at("slot") == s.name; });
-    if (m >= fitted.maps.size() || slot == kSlots.end())
+    const auto slot = asset::find_map_slot(entry.at("slot").get<std::string>());
+    if (m >= fitted.maps.size() || !slot)
       throw Error(ErrorCode::kFormat, run.file("stages.json").string(),
                   "the textures belong to another asset; run `patina fit` again");
     const auto path = run.file(entry.at("file").get<std::string>());
     const Image stored = read_image(path);
-    Map& map = fitted.maps[m].*(slot->map);
-    const int channels = slot->encoding == Encoding::kLinear ? 1 : 3;
+    const int channels = slot->channels;
     if (stored.channels < channels)
       throw Error(ErrorCode::kFormat, path.string(),
                   fmt::format("expected {} channels, found {}", channels, stored.channels));
@@ -189,8 +146,8 @@ FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run) {
       for (int c = 0; c < channels; ++c)
         picture.pixels[static_cast<size_t>(channels) * i + static_cast<size_t>(c)] =
             stored.pixels[static_cast<size_t>(stored.channels) * i + static_cast<size_t>(c)];
-    map.texels = to_texels(picture, slot->encoding);
-    fitted.changed[m].*(slot->changed) = true;
+    slot_map(fitted.maps[m], slot->slot).texels = asset::texels_of(picture, slot->encoding);
+    fitted.changed[m].set(index_of(slot->slot));
   }
   return fitted;
 }

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "patina/asset/map_slots.h"
 #include "patina/base/files.h"
-#include "patina/image/color.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/measures.h"
 #include "patina/pipeline/options.h"
@@ -38,30 +38,20 @@ std::string report_key(const Workbench& bench, const RenderedViews& views, std::
   for (const Image& image : views.tile) add(image);
   for (const Image& image : edited) add(image);
   for (const asset::MaterialMaps& m : fitted.maps)
-    for (const asset::Map* map : {&m.base_color, &m.roughness, &m.metallic, &m.normal}) add(map->texels);
+    for (const asset::MapSlotRow& row : asset::kMapSlots) add(slot_map(m, row.slot).texels);
   return hash_text(key);
 }
 
 std::vector<report::TexturePair> texture_pairs(const Workbench& bench, const FittedMaterials& fitted) {
   std::vector<report::TexturePair> pairs;
-  const auto encode_normal = [](Image image) {
-    for (float& value : image.pixels) value = 0.5f + 0.5f * value;
-    return image;
-  };
-  for (size_t m = 0; m < fitted.maps.size(); ++m) {
-    const asset::MaterialMaps &before = bench.maps[m], &after = fitted.maps[m];
-    const asset::ChangedMaps& changed = fitted.changed[m];
-    if (changed.base_color)
-      pairs.push_back({before.name, "base colour", srgb_from_linear(before.base_color.texels),
-                       srgb_from_linear(after.base_color.texels)});
-    if (changed.normal)
-      pairs.push_back(
-          {before.name, "normal", encode_normal(before.normal.texels), encode_normal(after.normal.texels)});
-    if (changed.roughness)
-      pairs.push_back({before.name, "roughness", before.roughness.texels, after.roughness.texels});
-    if (changed.metallic)
-      pairs.push_back({before.name, "metallic", before.metallic.texels, after.metallic.texels});
-  }
+  for (size_t m = 0; m < fitted.maps.size(); ++m)
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      if (!has(fitted.changed[m], row.slot)) continue;
+      const auto picture = [&](const asset::MaterialMaps& maps) {
+        return asset::picture_of(slot_map(maps, row.slot).texels, row.encoding);
+      };
+      pairs.push_back({bench.maps[m].name, row.title, picture(bench.maps[m]), picture(fitted.maps[m])});
+    }
   return pairs;
 }
 

@@ -48,7 +48,7 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
 /// time.
 struct FittedMaterials {
   std::vector<asset::MaterialMaps> maps;  // one a material of the asset
-  std::vector<asset::ChangedMaps> changed;
+  std::vector<asset::MapSet> changed;
 };
 FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
                           const Config& config, RunFolder& run, const Progress& progress);
