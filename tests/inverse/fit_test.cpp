@@ -104,6 +104,7 @@ TEST(fit, finds_base_colour_from_one_view) {
   EXPECT_GT(result.psnr, 25.0f);
 
   // The maps that were written look, path-traced, as the fit believed: what it shades is what it returns.
+  task.world.scene.set_asset_materials(result.maps);
   render::PathOptions path;
   path.samples_per_pixel = 64;
   const Image rendered = tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f);
@@ -132,6 +133,20 @@ TEST(fit, finds_textures_that_lie_on_the_surface_twice_each_way_or_once) {
     EXPECT_LT(after, 0.6 * before) << "wrap " << static_cast<int>(wrap) << ": " << before << " -> " << after;
     EXPECT_EQ(result.maps[0].base_color.uv_transform, task.world.maps[0].base_color.uv_transform);
   }
+}
+
+TEST(fit, continues_from_a_checkpoint_made_before_the_first_iteration) {
+  Task whole = make_task();
+  const inverse::FitOptions options = quick();
+  const auto expected =
+      all_texels(inverse::fit_materials(whole.world.scene, whole.views, whole.edited, options, {}, {}));
+  Task task = make_task();
+  const Progress progress;
+  inverse::Fit fit(task.world.scene, task.views, task.edited, options, progress);
+  inverse::FitHooks hooks;
+  hooks.resume = fit.checkpoint();
+  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, hooks, {});
+  EXPECT_TRUE(all_texels(result) == expected);
 }
 
 TEST(fit, is_the_same_for_any_number_of_threads) {

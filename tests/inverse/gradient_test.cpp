@@ -243,7 +243,7 @@ TEST(light_cache, gradients_of_a_real_asset_agree_texel_by_texel) {
   }
   inverse::LightCache cache;
   cache.pixels = inverse::select_pixels(views, targets, weights);
-  inverse::trace_cache(cache, scene, views, maps, {}, {});
+  inverse::trace_cache(cache, scene, maps, maps, views, {}, {});
   const std::vector<inverse::SeenPoint> seen = inverse::trace_seen_points(scene, views, cache.pixels);
 
   std::vector<inverse::FittedMap> fitted;

@@ -123,7 +123,7 @@ inverse::LightCache traced_cache(const World& world, const views::ViewSet& views
                                  const inverse::CacheOptions& options) {
   inverse::LightCache cache;
   cache.pixels = all_pixels(views);
-  inverse::trace_cache(cache, world.scene, views, world.maps, options, {});
+  inverse::trace_cache(cache, world.scene, world.scene.asset_materials(), world.maps, views, options, {});
   return cache;
 }
 

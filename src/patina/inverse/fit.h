@@ -2,82 +2,77 @@
 // [Hadadan2025, Sec. 4 and 5].
 #pragma once
 
-#include <functional>
-#include <optional>
+#include <array>
 #include <span>
 #include <vector>
 
-#include "patina/asset/material_maps.h"
 #include "patina/base/progress.h"
+#include "patina/inverse/cache_schedule.h"
+#include "patina/inverse/evaluate.h"
+#include "patina/inverse/fit_options.h"
+#include "patina/inverse/fit_state.h"
+#include "patina/inverse/light_cache.h"
 #include "patina/render/scene.h"
 #include "patina/views/view_set.h"
 
 namespace patina::inverse {
 
-/// FitOptions::texture_size: a power of two that keeps what the views resolve, never below the asset's own.
-inline constexpr int kAutoTextureSize = -1;
+/// Fits the scene's materials to `edited`, one sRGB [H,W,3] image in [0,1] a view. Calls the hooks on the
+/// way. Throws Error{kUsage} for views of other sizes, Error{kInterrupted} when progress asks to stop.
+FitResult fit_materials(const render::Scene& scene, const views::ViewSet& views,
+                        std::span<const Image> edited, const FitOptions& options, const FitHooks& hooks,
+                        const Progress& progress);
 
-struct FitOptions {
-  int iterations = 200;
-  int texture_size = 0;  // texels a side of fitted maps; 0: the asset's own size, or what the views resolve
-                         // for factor-only slots; kAutoTextureSize
-  asset::MapSet maps = asset::set_of(
-      {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal});  // that may change
-  std::vector<bool> materials;  // which materials may change; empty: all of the asset
-  float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
-  int light_samples = 8;        // incident directions kept a pixel
-  int max_depth = 4;            // of the paths that gather incident light
-  int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
-  bool fill_unseen = true;      // texels that no view saw get the change around them (unseen.h)
-  bool keep_in_place = false;   // do not move views that disagree toward each other (alignment.h)
-  uint64_t seed = 0;
+/// The same step by step: start or resume, iterate while there is work, choose the best, take the result.
+/// Refers to all that it is given but the options.
+class Fit {
+ public:
+  Fit(const render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
+      const FitOptions& options, const Progress& progress);
+  Fit(const Fit&) = delete;
+  Fit& operator=(const Fit&) = delete;
+
+  /// Casts the rays of the first light caches.
+  void start();
+  /// Goes on where `checkpoint` was made. Throws Error{kFormat} if it belongs to another fit.
+  void resume(const FitCheckpoint& checkpoint);
+
+  bool has_work() const;
+  /// One step of descent. Interrupted, it leaves the state as the last iteration left it.
+  void iterate();
+  int num_done() const { return state_.next_iteration; }
+
+  FitCheckpoint checkpoint() const { return make_checkpoint(state_); }
+  /// The views, sRGB [H,W,3], as the light caches show them: noisy, black where pixels count nothing.
+  std::vector<Image> rendered() const;
+  std::span<const float> loss() const { return state_.loss; }
+
+  /// Takes the best of the last textures, those after three quarters of the iterations, and the first, by
+  /// light caches that no iteration saw.
+  void choose_best();
+  /// What has been found so far. The end of this fit.
+  FitResult take_result();
+
+ private:
+  void trace(LightCache& cache, int generation);
+  LightCache& renew(int generation);
+
+  const render::Scene& scene_;
+  const views::ViewSet& views_;
+  std::span<const Image> edited_;
+  const FitOptions options_;
+  const Progress& progress_;
+  const float gain_;  // 2^exposure_ev
+  const CacheSchedule schedule_;
+  const std::vector<Image> weights_;             // of each view's pixels
+  std::vector<CachePixel> pixels_;               // that count, and toward what
+  const std::vector<asset::MaterialMaps> base_;  // starting maps at the size that they will be written with
+  FitState state_;
+  const Parameters untouched_;
+  const std::vector<asset::MaterialMaps> coarse_;  // starting maps at the size of the fields
+  Evaluator evaluator_;
+  std::array<LightCache, CacheSchedule::kPlaces> caches_;
+  float psnr_ = 0;  // of the chosen textures
 };
-
-/// State between iterations that restores a run exactly.
-struct FitCheckpoint {
-  int next_iteration = 0;
-  std::vector<uint8_t> bytes;
-};
-
-/// How finely the views sample a fitted map.
-struct MapDensity {
-  int material = 0;
-  int width = 0, height = 0;   // of the map that was fitted
-  float texels_per_pixel = 0;  // along one side; below 1 the views show more than the map can hold
-};
-
-struct FitResult {
-  std::vector<asset::MaterialMaps> maps;  // one entry a material of the asset
-  std::vector<asset::MapSet> changed;
-  std::vector<float> loss;  // per iteration
-  float psnr = 0;           // dB, re-rendered (cache) against edited views, sRGB, over unmasked pixels
-  std::vector<MapDensity> density;  // of base colours, one a material that was fitted
-  std::vector<Image> evidence;  // per material [h,w,1]: weight with which views saw each base-colour texel
-};
-
-/// How far a fit has come.
-struct FitPreview {
-  std::span<const Image> rendered;  // one a view, sRGB [H,W,3], as the light caches show it: noisy; black
-                                    // where pixels count nothing
-  std::span<const float> loss;      // per iteration so far
-};
-
-struct FitHooks {
-  std::function<void(const FitCheckpoint&)>
-      on_checkpoint;         // now and then (at least every 30 s), when the fit is stopped, and at the end
-  int every_iterations = 0;  // more often than that: a checkpoint each this many iterations; 0: by time alone
-  std::optional<FitCheckpoint> resume;
-  std::function<void(const FitPreview&)> on_preview;  // every five seconds, and at the end
-  std::function<void(const FitResult&)> on_stop;  // as far as it came, before Error{kInterrupted} is thrown
-};
-
-/// `edited`: one sRGB [H,W,3] image in [0,1] a view; `scene` holds the starting materials and is left with
-/// the fitted ones.
-FitResult fit_materials(render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
-                        const FitOptions& options, const FitHooks& hooks, const Progress& progress);
-
-/// Weight of every pixel in the loss, [H,W,1] in [0,1]: zero off the enhanced materials, within
-/// `boundary_pixels` of the object's boundary and of depth edges; times the view cosine at grazing angles.
-Image loss_weight(const views::GBuffer& gbuffer, const std::vector<bool>& materials, int boundary_pixels);
 
 }  // namespace patina::inverse

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "patina/inverse/evidence.h"
-#include "patina/inverse/fit.h"
+#include "patina/inverse/fit_options.h"
 #include "patina/inverse/texture_field.h"
 
 namespace patina::inverse {

@@ -71,8 +71,12 @@ struct Frame {
 
 }  // namespace
 
-LightGatherer::LightGatherer(const render::Scene& scene, const GatherOptions& options)
-    : scene_(scene), options_(options), aims_(static_cast<size_t>(options.num_directions)) {
+LightGatherer::LightGatherer(const render::Scene& scene, std::span<const asset::MaterialMaps> asset_materials,
+                             const GatherOptions& options)
+    : scene_(scene),
+      asset_materials_(asset_materials),
+      options_(options),
+      aims_(static_cast<size_t>(options.num_directions)) {
   PATINA_CHECK_LE(static_cast<int>(kNumStrategies), options.num_directions);
   directions_.resize(aims_.size());
 }
@@ -158,7 +162,7 @@ void LightGatherer::gather(const render::SurfacePoint& surface, const vec3& wo, 
         aim.from_environment ? aim.arrival : lights.arrival_from_environment(wi);
     float density = density_[i] + num_lights * arrival.pdf;
     if (hit && lights.has_emitters()) {
-      const render::SurfacePoint met = scene_.surface(ray, *hit);
+      const render::SurfacePoint met = scene_.surface(ray, *hit, asset_materials_);
       density += num_lights * lights.pdf_triangle(hit->primitive, hit->triangle, wi, hit->t, met.n_geometric);
     }
     if (!(density > 0.0f)) continue;
@@ -198,8 +202,8 @@ vec3 LightGatherer::radiance_of_hit(const render::Ray& ray, const render::Hit& h
   path.roulette_depth = 1;  // one direction of many: a short path tells enough
   path.show_environment = true;
   // A path decides anew whether blended surfaces are met or passed.
-  return scene_.has_blended() ? render::trace_path(scene_, ray, path, random)
-                              : render::trace_path_from(scene_, ray, hit, path, random);
+  return scene_.has_blended() ? render::trace_path(scene_, asset_materials_, ray, path, random)
+                              : render::trace_path_from(scene_, asset_materials_, ray, hit, path, random);
 }
 
 }  // namespace patina::inverse

@@ -28,7 +28,9 @@ struct GatherOptions {
 /// Gathers the light at one point after the other; keeps what all points share. One a thread.
 class LightGatherer {
  public:
-  LightGatherer(const render::Scene& scene, const GatherOptions& options);
+  /// `asset_materials` are worn in place of the scene's own; all arguments must live as long as the gatherer.
+  LightGatherer(const render::Scene& scene, std::span<const asset::MaterialMaps> asset_materials,
+                const GatherOptions& options);
 
   /// Entries that `gather` fills: directions and punctual lights (at most eight of them, chosen evenly).
   static int num_entries(const render::Scene& scene, const GatherOptions& options);
@@ -53,6 +55,7 @@ class LightGatherer {
   vec3 radiance_of_hit(const render::Ray& ray, const render::Hit& hit, RandomStream& random) const;
 
   const render::Scene& scene_;
+  std::span<const asset::MaterialMaps> asset_materials_;
   GatherOptions options_;
   std::vector<Aim> aims_;
   DirectionArrays directions_;

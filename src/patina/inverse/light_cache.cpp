@@ -40,9 +40,10 @@ std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<con
   return pixels;
 }
 
-void trace_cache(LightCache& cache, const render::Scene& scene, const views::ViewSet& views,
-                 const std::vector<asset::MaterialMaps>& base_maps, const CacheOptions& options,
-                 const Progress& progress) {
+void trace_cache(LightCache& cache, const render::Scene& scene,
+                 std::span<const asset::MaterialMaps> asset_materials,
+                 std::span<const asset::MaterialMaps> base_maps, const views::ViewSet& views,
+                 const CacheOptions& options, const Progress& progress) {
   const GatherOptions gather{options.light_samples, options.max_depth};
   cache.lights_per_pixel = LightGatherer::num_entries(scene, gather);
   cache.samples.resize(cache.pixels.size());
@@ -51,7 +52,7 @@ void trace_cache(LightCache& cache, const render::Scene& scene, const views::Vie
   constexpr int64_t kPixelsPerTask = 64;
   parallel_for(0, static_cast<int64_t>(cache.pixels.size()), kPixelsPerTask, [&](int64_t begin, int64_t end) {
     progress.throw_if_stopped();
-    LightGatherer gatherer(scene, gather);
+    LightGatherer gatherer(scene, asset_materials, gather);
     std::vector<IncidentLight> lights(static_cast<size_t>(cache.lights_per_pixel));
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
       const CachePixel& pixel = cache.pixels[i];
@@ -65,11 +66,12 @@ void trace_cache(LightCache& cache, const render::Scene& scene, const views::Vie
       CacheSample& sample = cache.samples[i];
       sample.hit = hit.has_value();
       if (!hit) continue;
-      const render::SurfacePoint surface = scene.surface(ray, *hit);
+      const render::SurfacePoint surface = scene.surface(ray, *hit, asset_materials);
       const auto material = static_cast<size_t>(surface.material);
       const bool is_context = material >= base_maps.size();
-      sample.point = material_point(surface, -ray.direction, scene.materials()[material]);
-      sample.base = sample_maps(is_context ? scene.materials()[material] : base_maps[material], sample.point);
+      const asset::MaterialMaps& base = is_context ? scene.materials()[material] : base_maps[material];
+      sample.point = material_point(surface, -ray.direction, base);
+      sample.base = sample_maps(base, sample.point);
       sample.emission = surface.emission;
       gatherer.gather(surface, -ray.direction, random, lights);
       PackedLight* packed = cache.lights.data() + i * lights.size();

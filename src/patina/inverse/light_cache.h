@@ -61,11 +61,12 @@ struct CacheOptions {
 std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<const Image> targets,
                                       std::span<const Image> weights);
 
-/// Traces samples and lights of `cache`, whose pixels are given; memory that it holds is used again.
-/// Directions follow the scene's current materials, and so does the light that other surfaces reflect;
-/// `base_maps` are the asset's starting maps from which CacheSample::base is read.
-void trace_cache(LightCache& cache, const render::Scene& scene, const views::ViewSet& views,
-                 const std::vector<asset::MaterialMaps>& base_maps, const CacheOptions& options,
-                 const Progress& progress);
+/// Traces samples and lights of `cache`, whose pixels are given; memory that it holds is used again. The
+/// asset wears `asset_materials`: directions follow them, and so does the light that its surfaces reflect.
+/// `base_maps` are the starting maps from which CacheSample::base is read.
+void trace_cache(LightCache& cache, const render::Scene& scene,
+                 std::span<const asset::MaterialMaps> asset_materials,
+                 std::span<const asset::MaterialMaps> base_maps, const views::ViewSet& views,
+                 const CacheOptions& options, const Progress& progress);
 
 }  // namespace patina::inverse

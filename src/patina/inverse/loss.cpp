@@ -5,7 +5,6 @@
 
 #include "patina/base/check.h"
 #include "patina/image/color.h"
-#include "patina/inverse/fit.h"
 
 namespace patina::inverse {
 namespace {

@@ -35,4 +35,8 @@ PixelLoss relative_l2(const vec3& radiance, const vec3& other, const vec3& targe
 /// Pixels of the edited view as the loss wants them: linear_from_srgb, clamped to [0,1].
 Image loss_target(const Image& edited);
 
+/// Weight of every pixel in the loss, [H,W,1] in [0,1]: zero off the enhanced materials, within
+/// `boundary_pixels` of the object's boundary and of depth edges; times the view cosine at grazing angles.
+Image loss_weight(const views::GBuffer& gbuffer, const std::vector<bool>& materials, int boundary_pixels);
+
 }  // namespace patina::inverse

@@ -9,7 +9,7 @@
 
 #include "patina/correspond/noise.h"
 #include "patina/diffusion/options.h"
-#include "patina/inverse/fit.h"
+#include "patina/inverse/fit_options.h"
 #include "patina/render/path_tracer.h"
 #include "patina/views/view_set.h"
 

@@ -1,7 +1,7 @@
 #include "patina/pipeline/measures.h"
 
 #include "patina/correspond/consistency.h"
-#include "patina/inverse/fit.h"
+#include "patina/inverse/loss.h"
 
 namespace patina::pipeline {
 

@@ -94,10 +94,8 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
       (void)write_maps(so_far, bench, run, kPreviewFolder);
     };
-    // The fit leaves its result in the scene it is given, so the original is put back afterwards.
     const inverse::FitResult fitted =
         inverse::fit_materials(*bench.scene, views.set, edited, options, hooks, progress);
-    bench.scene->set_asset_materials(bench.maps);
 
     RunFolder::StageResult result;
     WrittenMaps written = write_maps(fitted, bench, run, kFolder);

@@ -62,8 +62,8 @@ vec3 direct_light(const Scene& scene, const SurfacePoint& point, const Frame& fr
 }
 
 /// Radiance along `ray`, which meets `hit`.
-vec3 follow_path(const Scene& scene, Ray ray, std::optional<Hit> hit, const PathOptions& options,
-                 RandomStream& random) {
+vec3 follow_path(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, Ray ray,
+                 std::optional<Hit> hit, const PathOptions& options, RandomStream& random) {
   const Lights& lights = scene.light_sampler();
   const BsdfModel model = scene.bsdf_model();
   vec3 radiance(0.0f), throughput(1.0f);
@@ -81,7 +81,7 @@ vec3 follow_path(const Scene& scene, Ray ray, std::optional<Hit> hit, const Path
       return radiance;
     }
 
-    const SurfacePoint point = scene.surface(ray, *hit);
+    const SurfacePoint point = scene.surface(ray, *hit, asset_materials);
     if (max_component(point.emission) > 0.0f) {
       const float light_pdf = from_camera ? 0.0f
                                           : lights.pdf_triangle(hit->primitive, hit->triangle, ray.direction,
@@ -119,12 +119,23 @@ vec3 trace_path(const Scene& scene, const Ray& ray, const PathOptions& options, 
                 float* coverage) {
   const std::optional<Hit> hit = scene.intersect(ray, random.uniform());
   if (coverage) *coverage = hit ? 1.0f : 0.0f;
-  return follow_path(scene, ray, hit, options, random);
+  return follow_path(scene, scene.asset_materials(), ray, hit, options, random);
+}
+
+vec3 trace_path(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, const Ray& ray,
+                const PathOptions& options, RandomStream& random) {
+  const std::optional<Hit> hit = scene.intersect(ray, random.uniform());
+  return follow_path(scene, asset_materials, ray, hit, options, random);
 }
 
 vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const PathOptions& options,
                      RandomStream& random) {
-  return follow_path(scene, ray, first, options, random);
+  return follow_path(scene, scene.asset_materials(), ray, first, options, random);
+}
+
+vec3 trace_path_from(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, const Ray& ray,
+                     const Hit& first, const PathOptions& options, RandomStream& random) {
+  return follow_path(scene, asset_materials, ray, first, options, random);
 }
 
 Render render(const Scene& scene, const Camera& camera, const PathOptions& options, const Progress& progress,

@@ -205,6 +205,10 @@ const std::vector<asset::MaterialMaps>& Scene::materials() const {
   return state_->materials;
 }
 
+std::span<const asset::MaterialMaps> Scene::asset_materials() const {
+  return std::span(state_->materials).first(static_cast<size_t>(state_->num_asset_materials));
+}
+
 void Scene::set_asset_materials(std::vector<asset::MaterialMaps> maps) {
   PATINA_CHECK_EQ(static_cast<int>(maps.size()), state_->num_asset_materials);
   for (size_t m = 0; m < maps.size(); ++m) {

@@ -74,13 +74,17 @@ class Scene {
   std::optional<Hit> intersect(const Ray& ray, float u_alpha = 0.5f) const;
   /// True if anything lies between t_min and t_max; alpha as above.
   bool occluded(const Ray& ray, float u_alpha = 0.5f) const;
-  SurfacePoint surface(const Ray& ray, const Hit& hit) const;
+  SurfacePoint surface(const Ray& ray, const Hit& hit) const { return surface(ray, hit, asset_materials()); }
+  /// The same with other maps of the asset than the scene's own (num_asset_materials entries). Opacity and emission are still
+  /// the scene's where rays are cast and lights are sampled, so they must be the same.
+  SurfacePoint surface(const Ray& ray, const Hit& hit, std::span<const asset::MaterialMaps> asset_materials) const;
 
   /// Number of primitives (they come first) and materials that belong to the asset and not to the context.
   int num_asset_primitives() const;
   int num_asset_materials() const;
   const std::vector<const asset::Primitive*>& primitives() const;   // asset's, then context's
   const std::vector<asset::MaterialMaps>& materials() const;        // asset's, then context's
+  std::span<const asset::MaterialMaps> asset_materials() const;     // the first num_asset_materials of them
   /// Replaces the asset's materials (num_asset_materials entries).
   void set_asset_materials(std::vector<asset::MaterialMaps> maps);
   const Environment& environment() const;

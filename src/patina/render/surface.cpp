@@ -74,7 +74,8 @@ vec3 emission_at(const asset::MaterialMaps& material, const asset::Primitive& pr
                  map_uv_at(material.emission, primitive, primitive.triangles[triangle], barycentric));
 }
 
-SurfacePoint Scene::surface(const Ray& ray, const Hit& hit) const {
+SurfacePoint Scene::surface(const Ray& ray, const Hit& hit,
+                            std::span<const asset::MaterialMaps> asset_materials) const {
   const asset::Primitive& primitive = *state_->primitives[hit.primitive];
   const uvec3& t = primitive.triangles[hit.triangle];
   const vec2 w = hit.barycentric;
@@ -113,7 +114,9 @@ SurfacePoint Scene::surface(const Ray& ray, const Hit& hit) const {
     if (!primitive.uv[set].empty()) out.uv[set] = interpolate(primitive.uv[set], t, w);
   if (!primitive.color.empty()) out.vertex_color = vec3(interpolate(primitive.color, t, w));
 
-  const asset::MaterialMaps& material = state_->material(hit.primitive);
+  const auto m = static_cast<size_t>(out.material);
+  const asset::MaterialMaps& material =
+      m < asset_materials.size() ? asset_materials[m] : state_->materials[m];
   MapReader maps(out);
   out.bsdf.base_color = glm::clamp(maps.read3(material.base_color) * out.vertex_color, 0.0f, 1.0f);
   out.bsdf.roughness = glm::clamp(maps.read1(material.roughness), 0.0f, 1.0f);
