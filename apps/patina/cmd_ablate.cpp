@@ -27,18 +27,19 @@ std::vector<std::string> split_at_commas(const std::vector<std::string>& values)
   return parts;
 }
 
-// Each part of `option`'s values as the pipeline's option `like` would take it, so that ranges and messages
-// are the same.
+// Each part of the values of `name` as the pipeline's option `like` takes it, so that ranges and messages are
+// the same.
 template <class Member>
-auto parsed(const std::string& option, const std::vector<std::string>& values, const char* like,
+auto parsed(const std::string& name, const std::vector<std::string>& values, const char* like,
             Member member) {
   std::vector<std::decay_t<decltype(member(std::declval<const pipeline::Config&>()))>> out;
+  const pipeline::Option& option = *pipeline::find_option(like);
   for (const std::string& part : split_at_commas(values)) {
     pipeline::Config config;
     try {
-      pipeline::find_option(like)->set(config, std::span(&part, 1));
+      option.set(config, pipeline::value_of_texts(option, std::span(&part, 1)));
     } catch (const Error& e) {
-      throw Error(e.code(), option, e.message());
+      throw Error(e.code(), name, e.message());
     }
     out.push_back(member(config));
   }
@@ -52,13 +53,12 @@ void add_ablate(CLI::App& program) {
                                              "Compare what each part adds to the views' consistency: "
                                              "baseline, + ControlNet tile, + noise, + attention bias.");
   struct Own {
-    std::string asset, output;
+    std::string output;
     std::vector<std::string> weights, scalings, views;
     bool no_fit = false;
   };
   const auto own = std::make_shared<Own>();
   constexpr size_t kMany = CLI::detail::expected_max_vector_size;
-  command->add_option("ASSET", own->asset, "The asset: .glb, .gltf or .obj.")->required()->type_name("");
   command
       ->add_option(
           "-o,--output", own->output,
@@ -91,30 +91,31 @@ void add_ablate(CLI::App& program) {
                  "takes longer.")
       ->group("Comparison");
   const auto point = add_point_options(*command, "Comparison");
-  const auto given =
-      add_options(*command, ~0u, {"output", "run", "turntable", "views", "noise", "bias", "bias-scaling"});
+  const auto given = add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.", pipeline::kEverything,
+                                 {"output", "run", "turntable", "views", "noise", "bias", "bias-scaling"});
   command->callback([=] {
+    find_positional(*given);
     pipeline::Config config;
     apply_options(*given, config);
-    config.asset = own->asset;
+    config.inputs.asset = given->positional;
     require_prompt(config);
     if (own->output.empty())
-      throw Error(ErrorCode::kUsage, "--output", "say in which folder the comparison goes, e.g. -o ablation");
+      throw Error(ErrorCode::kUsage, "output", "say in which folder the comparison goes, e.g. -o ablation");
     pipeline::AblationOptions options;
     options.fit = !own->no_fit;
     options.point = point->options();
     if (!own->weights.empty())
       options.weights =
-          parsed("--weights", own->weights, "bias", [](const auto& c) { return c.detail.bias_weight; });
+          parsed("weights", own->weights, "bias", [](const auto& c) { return c.edit.options.bias_weight; });
     if (!own->scalings.empty())
-      options.scalings = parsed("--bias-scaling", own->scalings, "bias-scaling",
-                                [](const auto& c) { return c.detail.bias_scaling; });
+      options.scalings = parsed("bias-scaling", own->scalings, "bias-scaling",
+                                [](const auto& c) { return c.edit.options.bias_scaling; });
     if (!own->views.empty())
       options.view_counts =
-          parsed("--views", own->views, "views", [](const auto& c) { return c.orbit.num_views; });
+          parsed("views", own->views, "views", [](const auto& c) { return c.inputs.orbit.num_views; });
 
     set_num_threads(config.num_threads);
-    Console console(given->quiet ? Verbosity::kQuiet : Verbosity::kNormal);
+    Console console(given->style());
     const nlohmann::json result = pipeline::ablate(config, options, own->output, console.progress());
     console.finish();
     for (const auto& step : result.at("steps")) {
@@ -124,8 +125,7 @@ void add_ablate(CLI::App& program) {
                       correlation.is_number() ? fmt::format("{:.3f}", correlation.get<double>()) : "n/a"));
     }
     const std::filesystem::path folder = own->output;
-    console.say(fmt::format("page     {}\nnumbers  {}", (folder / "ablation.html").string(),
-                            (folder / "ablation.json").string()));
+    console.result({{"page", folder / "ablation.html"}, {"numbers", folder / "ablation.json"}});
   });
 }
 

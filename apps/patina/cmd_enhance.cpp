@@ -7,29 +7,28 @@
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
 #include "patina/pipeline/enhance.h"
+#include "patina/pipeline/options.h"
 
 namespace patina::app {
 
 void add_enhance(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "enhance", "Give an asset new detail: asset and prompt in, the same asset with new textures out.");
-  auto asset = std::make_shared<std::string>();
-  command->add_option("ASSET", *asset, "The asset: .glb, .gltf or .obj.")->required()->type_name("");
-  const auto given = add_options(*command, ~0u);
+      "enhance",
+      "Give an asset new detail: reads an asset and a prompt, writes the same asset with new textures.");
+  const auto given = add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.", pipeline::kEverything);
   command->callback([=] {
+    find_positional(*given);
     pipeline::Config config;
     apply_options(*given, config);
-    config.asset = *asset;
+    config.inputs.asset = given->positional;
     require_prompt(config);
     if (config.output.empty())
-      throw Error(ErrorCode::kUsage, "--output", "say where the result goes, e.g. -o rusty.glb");
+      throw Error(ErrorCode::kUsage, "output", "say where the result goes, e.g. -o rusty.glb");
     set_num_threads(config.num_threads);
-    Console console(given->quiet ? Verbosity::kQuiet : Verbosity::kNormal);
+    Console console(given->style());
     pipeline::RunFolder run(pipeline::run_folder_path(config));
     pipeline::enhance(config, run, console.progress());
-    console.finish();
-    console.say(
-        fmt::format("asset   {}\nreport  {}", config.output.string(), run.file("report.html").string()));
+    console.result({{"asset", config.output}, {"report", run.file("report.html")}});
   });
 }
 

@@ -16,11 +16,10 @@ void add_show_attention(CLI::App& program) {
                                              "Show what one surface point attends to in the U-Net, without "
                                              "and with the attention bias, over the view grid.");
   struct Own {
-    std::string asset, output, layer;
+    std::string output, layer;
     int step = 0;
   };
   const auto own = std::make_shared<Own>();
-  command->add_option("ASSET", own->asset, "The asset: .glb, .gltf or .obj.")->required()->type_name("");
   command->add_option("-o,--output", own->output, "A page with the numbers (.html) or one picture (.png).")
       ->type_name("FILE")
       ->group("Input and output");
@@ -35,40 +34,42 @@ void add_show_attention(CLI::App& program) {
       command->add_option("--step", own->step, "Which evaluation of the network, from 1. [the middle one]")
           ->type_name("K")
           ->group("What is shown");
-  const auto given =
-      add_options(*command, pipeline::kRenderStage | pipeline::kDetailStage, {"output", "material"});
+  using namespace pipeline;
+  const auto given = add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.",
+                                 kInputs | kRender | kEdit | kMachine, {"material"});
   command->callback([=] {
+    find_positional(*given);
     pipeline::Config config;
     apply_options(*given, config);
-    config.asset = own->asset;
+    config.inputs.asset = given->positional;
     require_prompt(config);
     if (own->output.empty())
-      throw Error(ErrorCode::kUsage, "--output", "say where the picture goes, e.g. -o attention.html");
+      throw Error(ErrorCode::kUsage, "output", "say where the picture goes, e.g. -o attention.html");
     pipeline::check_attention_output(own->output);
     pipeline::AttentionOptions options;
     options.layer = own->layer;
     options.point = point->options();
     if (step->count() > 0 && own->step < 1)
-      throw Error(ErrorCode::kUsage, "--step", fmt::format("expected 1 or more, found {}", own->step));
+      throw Error(ErrorCode::kUsage, "step", fmt::format("expected 1 or more, found {}", own->step));
     options.evaluation = own->step;
 
     const std::filesystem::path output = own->output;
     if (config.run.empty()) config.run = output.parent_path() / (output.stem().string() + ".patina-run");
     set_num_threads(config.num_threads);
-    Console console(given->quiet ? Verbosity::kQuiet : Verbosity::kNormal);
+    Console console(given->style());
     pipeline::RunFolder run(config.run);
     const pipeline::ShownAttention shown = pipeline::show_attention(config, options, run, console.progress());
     pipeline::write_attention(shown, config, output);
-    console.finish();
     const report::AttentionFigure& figure = shown.figure;
     console.say(
         fmt::format("{}, evaluation {} of {}: {} of {} keys are biased; their share of the attention is "
                     "{:.4g} % without and "
-                    "{:.4g} % with the bias\n{}",
+                    "{:.4g} % with the bias",
                     diffusion::short_name(shown.captured.layer), shown.captured.evaluation,
                     shown.captured.num_evaluations, figure.biased_keys.size(), figure.with.size(),
                     100 * report::share_of(figure.without, figure.biased_keys),
-                    100 * report::share_of(figure.with, figure.biased_keys), output.string()));
+                    100 * report::share_of(figure.with, figure.biased_keys)));
+    console.result({{"attention", output}});
   });
 }
 

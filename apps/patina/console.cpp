@@ -11,11 +11,16 @@
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "peak_memory.h"
 
 namespace patina::app {
 namespace {
 
+using nlohmann::json;
+using pipeline::StageEvent;
+
 constexpr double kRedrawSeconds = 0.1;  // on a terminal
+constexpr double kEventSeconds = 0.5;   // an event of progress
 constexpr double kLogSeconds = 15.0;    // a line in a log
 constexpr double kQuietSeconds = 1.0;   // jobs shorter than this draw nothing
 constexpr int kBarWidth = 24;
@@ -26,7 +31,51 @@ extern "C" void on_stop_signal(int signal) {
   if (g_stop_requests.fetch_add(1) > 0) std::_Exit(128 + signal);
 }
 
+// Failures are ignored: a full disk or a closed terminal must not end a run of hours.
+void write_error_stream(std::string_view text) {
+  (void)std::fwrite(text.data(), 1, text.size(), stderr);
+  (void)std::fflush(stderr);
+}
+
+const char* name_of(StageEvent event) {
+  switch (event) {
+    case StageEvent::kStarted:
+      return "started";
+    case StageEvent::kReused:
+      return "reused";
+    case StageEvent::kFinished:
+      return "finished";
+  }
+  return "";
+}
+
 }  // namespace
+
+void write_event(const json& event) {
+  write_error_stream(event.dump(-1, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+const char* name_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kUsage:
+      return "usage";
+    case ErrorCode::kNotFound:
+      return "not found";
+    case ErrorCode::kFormat:
+      return "format";
+    case ErrorCode::kUnsupported:
+      return "unsupported";
+    case ErrorCode::kLimit:
+      return "limit";
+    case ErrorCode::kIo:
+      return "io";
+    case ErrorCode::kDevice:
+      return "device";
+    case ErrorCode::kInterrupted:
+      return "interrupted";
+  }
+  return "";
+}
 
 void install_stop_handler() {
   std::signal(SIGINT, on_stop_signal);
@@ -40,37 +89,75 @@ std::string format_duration(double seconds) {
   return fmt::format("{} s", s);
 }
 
-Console::Console(Verbosity verbosity)
-    : quiet_(verbosity == Verbosity::kQuiet), is_terminal_(::isatty(STDERR_FILENO) != 0) {}
+Console::Console(Style style)
+    : json_(style == Style::kJson || style == Style::kQuietJson),
+      quiet_(style == Style::kQuiet || style == Style::kQuietJson),
+      is_terminal_(!json_ && ::isatty(STDERR_FILENO) != 0) {}
 
 Console::~Console() {
   finish();
 }
 
-Progress Console::progress() {
-  Progress progress;
+pipeline::RunProgress Console::progress() {
+  pipeline::RunProgress progress;
   progress.on_update = [this](std::string_view task, double done, double total) {
     update(task, done, total);
   };
   progress.on_warning = [this](std::string_view text) {
-    say(fmt::format("note: {}", printable(text, 1000)));
+    if (json_ && !quiet_)
+      write_event({{"event", "warning"}, {"text", printable(text, 1000)}});
+    else
+      say(fmt::format("note: {}", printable(text, 1000)));
+  };
+  progress.on_stage = [this](std::string_view stage, StageEvent event) {
+    if (event == StageEvent::kStarted) reset_peak_memory();
+    stage_ = event == StageEvent::kStarted ? stage : "";
+    if (json_ && !quiet_) write_event({{"event", "stage"}, {"stage", stage}, {"state", name_of(event)}});
+  };
+  progress.on_preview = [this](const std::filesystem::path& file) {
+    if (json_ && !quiet_)
+      write_event(
+          {{"event", "preview"}, {"stage", stage_}, {"file", std::filesystem::absolute(file).string()}});
   };
   progress.stop_requested = [] { return g_stop_requests.load() > 0; };
   return progress;
 }
 
 void Console::say(std::string_view text) {
-  if (quiet_) return;
-  if (is_terminal_ && bar_drawn_) std::fputs("\r\x1b[K", stderr);
-  fmt::print(stderr, "{}\n", text);
+  if (quiet_ || json_) return;
+  if (is_terminal_ && bar_drawn_) write_error_stream("\r\x1b[K");
+  write_error_stream(fmt::format("{}\n", text));
   if (is_terminal_ && bar_drawn_) draw(last_done_, last_total_);
+}
+
+void Console::result(const std::vector<Made>& made) {
+  finish();
+  if (json_) {
+    json event = {{"event", "result"}};
+    for (const Made& m : made) event[m.name] = std::filesystem::absolute(m.path).string();
+    write_event(event);
+    return;
+  }
+  size_t width = 0;
+  for (const Made& m : made) width = std::max(width, m.name.size());
+  for (const Made& m : made) say(fmt::format("{:<{}}  {}", m.name, width, m.path.string()));
+}
+
+double Console::elapsed() const {
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+double Console::seconds_left(double done, double total) const {
+  const double rate = (done - first_done_) / std::max(elapsed(), 1e-3);
+  return rate > 0 ? (total - done) / rate : -1;
 }
 
 void Console::update(std::string_view task, double done, double total) {
   if (quiet_ || !(total > 0)) return;
   const Clock::time_point now = Clock::now();
   if (task == task_ && done >= total && last_done_ >= total) return;  // said already
-  if (task != task_ || done < last_done_) {
+  const bool is_new = task != task_ || done < last_done_;
+  if (is_new) {
     finish();
     task_ = task;
     start_ = last_drawn_ = now;
@@ -79,35 +166,39 @@ void Console::update(std::string_view task, double done, double total) {
   last_done_ = done;
   last_total_ = total;
   const double since_drawn = std::chrono::duration<double>(now - last_drawn_).count();
-  const double since_start = std::chrono::duration<double>(now - start_).count();
-  const bool due = since_drawn >= (is_terminal_ ? kRedrawSeconds : kLogSeconds);
-  if (since_start < kQuietSeconds || (!due && done < total)) return;
+  const bool due = since_drawn >= (json_ ? kEventSeconds : is_terminal_ ? kRedrawSeconds : kLogSeconds);
+  if (json_ ? !is_new && !due && done < total : elapsed() < kQuietSeconds || (!due && done < total)) return;
   last_drawn_ = now;
   draw(done, total);
 }
 
 void Console::draw(double done, double total) {
   const double share = std::clamp(done / total, 0.0, 1.0);
-  const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
-  // The rate since the task began here, so that a resumed task does not promise too much.
-  const double rate = (done - first_done_) / std::max(elapsed, 1e-3);
-  const std::string left = share >= 1 ? "took " + format_duration(elapsed)
-                           : rate > 0 ? format_duration((total - done) / rate) + " left"
-                                      : "";
+  const double left = seconds_left(done, total);
+  if (json_) {
+    write_event({{"event", "progress"},
+                 {"stage", stage_},
+                 {"task", task_},
+                 {"share", share},
+                 {"seconds_left", left >= 0 ? json(std::round(left * 10) / 10) : json()}});
+    return;
+  }
+  const std::string text = share >= 1  ? "took " + format_duration(elapsed())
+                           : left >= 0 ? format_duration(left) + " left"
+                                       : "";
   if (is_terminal_) {
     const int filled = static_cast<int>(std::lround(share * kBarWidth));
     std::string bar;
     for (int i = 0; i < kBarWidth; ++i) bar += i < filled ? "━" : "─";
-    fmt::print(stderr, "\r\x1b[K{:<14} {} {:3.0f} %  {}", task_, bar, 100 * share, left);
-    std::fflush(stderr);
+    write_error_stream(fmt::format("\r\x1b[K{:<14} {} {:3.0f} %  {}", task_, bar, 100 * share, text));
     bar_drawn_ = true;
   } else {
-    fmt::print(stderr, "{:<14} {:3.0f} %  {}\n", task_, 100 * share, left);
+    write_error_stream(fmt::format("{:<14} {:3.0f} %  {}\n", task_, 100 * share, text));
   }
 }
 
 void Console::finish() {
-  if (bar_drawn_) std::fputc('\n', stderr);
+  if (bar_drawn_) write_error_stream("\n");
   bar_drawn_ = false;
   task_.clear();
   last_done_ = 0;

@@ -1,42 +1,65 @@
 // What the user sees while patina works: a bar with the time left on a terminal, a line now and then in a
-// log, warnings, and how Ctrl-C becomes a stop.
+// log, or events for programs (docs/progress.md); warnings; and how Ctrl-C becomes a stop.
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "patina/base/progress.h"
+#include <nlohmann/json.hpp>
+
+#include "patina/base/error.h"
+#include "patina/pipeline/run_progress.h"
 
 namespace patina::app {
 
-enum class Verbosity { kQuiet, kNormal };
+enum class Style { kPlain, kQuiet, kJson, kQuietJson };
 
-/// Draws to standard error. One at a time; finish() or the destructor ends a bar that is still drawn.
+/// Something that a command made: "asset", "report", and where it lies.
+struct Made {
+  std::string name;
+  std::filesystem::path path;
+};
+
+/// Writes to standard error. One at a time; finish() or the destructor ends a bar that is still drawn. Text
+/// that cannot be written is lost and stops nothing.
 class Console {
  public:
-  explicit Console(Verbosity verbosity);
+  explicit Console(Style style);
   ~Console();
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
   /// Functions that draw here; valid as long as the console.
-  Progress progress();
-  /// A line of its own.
+  pipeline::RunProgress progress();
+  /// A line of its own, for people.
   void say(std::string_view text);
+  /// The command is done, and this is what it made.
+  void result(const std::vector<Made>& made);
   void finish();
 
  private:
   using Clock = std::chrono::steady_clock;
   void update(std::string_view task, double done, double total);
   void draw(double done, double total);
+  double elapsed() const;
+  /// At the rate since the task began here, so that a resumed task does not promise too much; < 0: unknown.
+  double seconds_left(double done, double total) const;
 
-  bool quiet_, is_terminal_;
-  std::string task_;
+  bool json_, quiet_, is_terminal_;
+  std::string task_, stage_;
   Clock::time_point start_, last_drawn_;
   double first_done_ = 0, last_done_ = 0, last_total_ = 0;
   bool bar_drawn_ = false;
 };
+
+/// One event of --progress json on standard error. Bytes that are not UTF-8 are replaced.
+void write_event(const nlohmann::json& event);
+
+/// "usage", "not found", ...: the kind of a failure in events.
+const char* name_of(ErrorCode code);
 
 /// Installs a handler for Ctrl-C and termination: the first asks the running stage to stop and keep what it
 /// has, the second ends at once.

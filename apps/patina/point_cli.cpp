@@ -17,7 +17,7 @@ std::pair<int, int> parse_pixel(const std::string& text) {
     const auto [rest, y_failure] = std::from_chars(comma + 1, end, pixel.second);
     if (y_failure == std::errc() && rest == end) return pixel;
   }
-  throw Error(ErrorCode::kUsage, "--pixel",
+  throw Error(ErrorCode::kUsage, "pixel",
               fmt::format("expected two whole numbers as in 120,64, found '{}'", printable(text)));
 }
 

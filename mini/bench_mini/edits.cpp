@@ -7,27 +7,27 @@ using namespace pipeline;
 
 Config edit_config(const HeldOutAsset& asset, const EditSettings& settings) {
   Config config;
-  config.asset = asset.path;
-  config.model = settings.model;
-  config.orbit.num_views = settings.num_views;
-  config.orbit.resolution = settings.resolution;
-  config.detail.num_steps = settings.num_steps;
-  config.detail.guidance_scale = settings.guidance_scale;
-  config.detail.negative_prompt = settings.negative_prompt;
-  config.detail.fine_detail = settings.fine_detail;
-  config.turntable_frames = 0;
+  config.inputs.asset = asset.path;
+  config.edit.model = settings.model;
+  config.inputs.orbit.num_views = settings.num_views;
+  config.inputs.orbit.resolution = settings.resolution;
+  config.edit.options.num_steps = settings.num_steps;
+  config.edit.options.guidance_scale = settings.guidance_scale;
+  config.edit.options.negative_prompt = settings.negative_prompt;
+  config.edit.options.fine_detail = settings.fine_detail;
+  config.report.turntable_frames = 0;
   config.num_threads = settings.num_threads;
   return config;
 }
 
 AssetEditor::AssetEditor(const HeldOutAsset& asset, const EditSettings& settings, const fs::path& folder,
-                         std::optional<diffusion::Model>& model)
+                         pipeline::ResolvedModel& model)
     : config_(edit_config(asset, settings)),
       folder_(folder / asset.name),
       model_(model),
-      bench_(open_workbench(config_, {})) {
+      bench_(open_workbench(config_.inputs, {})) {
   RunFolder run(folder_ / "views");
-  views_ = render_stage(bench_, config_, run, {});
+  views_ = render_stage(bench_, config_.render, run, {});
   for (const views::View& view : views_.set.views) {
     Image coverage(view.gbuffer.width, view.gbuffer.height, 1);
     coverage.pixels = view.gbuffer.coverage;
@@ -36,10 +36,10 @@ AssetEditor::AssetEditor(const HeldOutAsset& asset, const EditSettings& settings
 }
 
 std::vector<Image> AssetEditor::edited(const std::string& name, const std::string& prompt) const {
-  Config config = config_;
-  config.detail.prompt = prompt;
+  pipeline::EditSettings settings = config_.edit;
+  settings.options.prompt = prompt;
   RunFolder run(folder_ / name);
-  return detail_stage(bench_, views_, config, run, {}, &model_);
+  return edit_stage(bench_, views_, settings, model_, run, {});
 }
 
 }  // namespace patina::bench

@@ -32,7 +32,7 @@ class AssetEditor {
  public:
   /// `model` is loaded where it is empty and needed, and stays.
   AssetEditor(const HeldOutAsset& asset, const EditSettings& settings, const std::filesystem::path& folder,
-              std::optional<diffusion::Model>& model);
+              pipeline::ResolvedModel& model);
 
   const pipeline::RenderedViews& views() const { return views_; }
   /// Share of each pixel that surface which may change covers, [H,W,1] a view.
@@ -43,7 +43,7 @@ class AssetEditor {
  private:
   pipeline::Config config_;
   std::filesystem::path folder_;
-  std::optional<diffusion::Model>& model_;
+  pipeline::ResolvedModel& model_;
   pipeline::Workbench bench_;
   pipeline::RenderedViews views_;
   std::vector<Image> coverage_;

@@ -165,8 +165,7 @@ Ranking judged(const AssetEditor& editor, std::span<const Image> edited, const D
 }  // namespace
 
 json measure_edits(std::span<const HeldOutAsset> assets, const EditSettings& settings,
-                   const Discriminant& classifier, const fs::path& folder,
-                   std::optional<diffusion::Model>& model) {
+                   const Discriminant& classifier, const fs::path& folder, pipeline::ResolvedModel& model) {
   Obedience obedience;
   Clean clean;
   Structure structure;

@@ -16,6 +16,6 @@ namespace patina::bench {
 /// views and a sheet in `folder`. {"obedience": …, "clean": …, "structure": …}.
 nlohmann::json measure_edits(std::span<const HeldOutAsset> assets, const EditSettings& settings,
                              const Discriminant& classifier, const std::filesystem::path& folder,
-                             std::optional<diffusion::Model>& model);
+                             pipeline::ResolvedModel& model);
 
 }  // namespace patina::bench

@@ -25,6 +25,7 @@
 #include "parts.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/parallel.h"
 #include "patina/pipeline/options.h"
 #include "priors_part.h"
 #include "vae_part.h"
@@ -65,7 +66,7 @@ std::string settings_key(const EditSettings& settings, const std::vector<HeldOut
 // Held-out shapes with held-out materials, clean and aged, and the held-out assets as rendered.
 std::vector<MaskedPicture> held_out_pictures(const Arguments& arguments, const EditSettings& settings,
                                              const std::vector<HeldOutAsset>& assets, const fs::path& folder,
-                                             std::optional<diffusion::Model>& model) {
+                                             pipeline::ResolvedModel& model) {
   constexpr uint64_t kPlans = 16, kSeed = 91;
   std::vector<MaskedPicture> out;
   const Composer composer(arguments.shards, mini_data::Part::kHeldOut, mini_data::Part::kHeldOut);
@@ -101,6 +102,7 @@ json at_or_null(const json& values, const char* pointer) {
 void run(const Arguments& arguments) {
   const fs::path folder = fs::path(arguments.out).replace_extension();
   fs::create_directories(folder);
+  set_num_threads(arguments.threads);
   std::vector<HeldOutAsset> assets = held_out_assets(arguments.shared, arguments.repository);
   assets.resize(std::min(assets.size(), static_cast<size_t>(arguments.num_assets)));
 
@@ -118,12 +120,7 @@ void run(const Arguments& arguments) {
   const std::string model_hash = hash_of_all(arguments.model);
   const std::string key = model_hash + "\n" PATINA_VERSION "\n" + settings_key(settings, assets);
   const std::string priors_key = model_hash + "\n" PATINA_VERSION "\n" + settings_key(for_priors, assets);
-  std::optional<diffusion::Model> model;
-  const auto load = [&]() -> const diffusion::Model& {
-    if (!model)
-      model.emplace(settings.model, diffusion::ModelOptions{diffusion::Dtype::kAuto, settings.num_threads});
-    return *model;
-  };
+  pipeline::ResolvedModel model(edit_config(assets.front(), settings).edit);
 
   // A part that is not asked for is told all the same where it has been measured already.
   json parts = json::object();
@@ -137,19 +134,19 @@ void run(const Arguments& arguments) {
 
   const std::string materials_key = classifier_key(arguments.shards, arguments.model / "vae");
   add("vae", key + materials_key, [&] {
-    return measure_vae(load(), held_out_pictures(arguments, settings, assets, folder, model),
+    return measure_vae(model.loaded(), held_out_pictures(arguments, settings, assets, folder, model),
                        folder / "vae.png");
   });
   add("edits", key + materials_key, [&] {
     const AsEditedView shown = [&](const Image& before, const Image& after) {
-      return as_edited_view(load(), before, after);
+      return as_edited_view(model.loaded(), before, after);
     };
     const Classifier classifier = trained_classifier(arguments.shards, shown, folder, materials_key);
     return measure_edits(assets, settings, classifier.discriminant, folder / "edits", model);
   });
   if (std::optional<json> trials = kept_result(folder, kClassifierTrials, materials_key))
     parts["classifier"] = *std::move(trials);
-  model.reset();  // the priors' runs load it themselves
+  model.unmodel.loaded();  // the priors' runs load it themselves
   // The sweep first: the pages of both lie in one folder, and the one with textures shall stay.
   add("sweep", priors_key + json(arguments.weights).dump(),
       [&] { return measure_sweep(assets, for_priors, arguments.weights, folder / "priors"); });

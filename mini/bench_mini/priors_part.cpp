@@ -24,16 +24,16 @@ constexpr const char* kMeasures[] = {"edit_correlation", "edit_psnr", "edit_shar
 json ablated(const HeldOutAsset& asset, const EditSettings& settings, const AblationOptions& options,
              const fs::path& folder) {
   pipeline::Config config = edit_config(asset, settings);
-  config.detail.prompt = fmt::format("a rusty old {}", asset.words);
+  config.edit.options.prompt = fmt::format("a rusty old {}", asset.words);
   // Half of the default's iterations: all steps alike, in less time.
-  config.fit.iterations = 100;
+  config.fit.options.iterations = 100;
   Progress progress;
   progress.on_update = [&](std::string_view task, double done, double total) {
     if (task.find("steps") == task.npos) return;
     std::printf("\r%-8s %s %.1f of %.0f   ", asset.name.c_str(), std::string(task).c_str(), done, total);
     std::fflush(stdout);
   };
-  const json result = pipeline::ablate(config, options, folder / asset.name, progress);
+  const json result = pipeline::ablate(config, options, folder / asset.name, {progress});
   std::printf("\n");
   return result.at("steps");
 }
@@ -53,7 +53,7 @@ json measure_steps(std::span<const HeldOutAsset> assets, const EditSettings& set
                    const fs::path& folder) {
   AblationOptions options;
   options.noise_paper = false;
-  options.weights = {edit_config(assets[0], settings).detail.bias_weight};
+  options.weights = {edit_config(assets[0], settings).edit.options.bias_weight};
   std::vector<json> all;
   json by_asset = json::object();
   for (const HeldOutAsset& asset : assets) {

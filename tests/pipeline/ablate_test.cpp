@@ -89,7 +89,7 @@ TEST(Ablate, shows_every_step_with_the_numbers_of_its_run_folder) {
     // What the run folder gives by hand.
     const Config config = read_config(out / step.at("run").get<std::string>());
     const RunFolder run(config.run);
-    const Workbench bench = open_workbench(config, {});
+    const Workbench bench = open_workbench(config.inputs, {});
     const RenderedViews views = load_views(bench, run);
     const std::vector<Image> edited = load_edited(views, run);
     const auto consistency = correspond::edit_consistency(*bench.scene, views.set, views.tile, edited);
@@ -99,7 +99,7 @@ TEST(Ablate, shows_every_step_with_the_numbers_of_its_run_folder) {
     for (size_t v = 0; v < edited.size(); ++v)
       sharpness += report::sharpness_kept(
           edited[v], views.tile[v],
-          inverse::loss_weight(views.set.views[v].gbuffer, bench.enhanced, config.fit.boundary_pixels));
+          inverse::loss_weight(views.set.views[v].gbuffer, bench.enhanced, config.report.boundary_pixels));
     EXPECT_NEAR(step.at("edit_sharpness").get<double>(), sharpness / static_cast<double>(edited.size()),
                 1e-5);
     const json metrics = read_json(run.file("metrics.json"));
@@ -195,9 +195,9 @@ TEST_F(AblateEdits, render_once_and_run_nothing_twice) {
 
 TEST(Ablate, every_step_changes_one_thing) {
   Config config;
-  config.detail.tile_scale = 0.7f;
-  config.detail.bias_weight = 5;
-  config.seed = 3;
+  config.edit.options.tile_scale = 0.7f;
+  config.edit.options.bias_weight = 5;
+  config.edit.options.seed = 3;
   AblationOptions options;
   options.weights = {0.6f, 1.8f};
   options.scalings = {diffusion::BiasScaling::kAdditive, diffusion::BiasScaling::kPaper};
@@ -212,12 +212,12 @@ TEST(Ablate, every_step_changes_one_thing) {
   std::set<std::string> folders;
   for (size_t i = 0; i < steps.size(); ++i) {
     const Config& c = steps[i].config;
-    EXPECT_EQ(c.detail.tile_scale, i == 0 ? 0.0f : 0.7f);
-    EXPECT_EQ(c.noise, noise[i]);
-    EXPECT_EQ(c.detail.bias_weight, weight[i]);
-    EXPECT_EQ(c.detail.bias_scaling == diffusion::BiasScaling::kPaper, i >= 6);
-    EXPECT_EQ(c.orbit.num_views, 16);
-    EXPECT_EQ(c.seed, 3u);
+    EXPECT_EQ(c.edit.options.tile_scale, i == 0 ? 0.0f : 0.7f);
+    EXPECT_EQ(c.edit.noise, noise[i]);
+    EXPECT_EQ(c.edit.options.bias_weight, weight[i]);
+    EXPECT_EQ(c.edit.options.bias_scaling == diffusion::BiasScaling::kPaper, i >= 6);
+    EXPECT_EQ(c.inputs.orbit.num_views, 16);
+    EXPECT_EQ(c.edit.options.seed, 3u);
     folders.insert(c.run.string());
   }
   EXPECT_EQ(folders.size(), steps.size());
@@ -233,7 +233,7 @@ TEST(Ablate, refuses_what_would_compare_a_step_with_itself) {
   options.weights = {};
   EXPECT_EQ(ablation_steps({}, options, "out").size(), 4u);
   Config config;
-  config.detail.tile_scale = 0;
+  config.edit.options.tile_scale = 0;
   EXPECT_THROW(ablation_steps(config, options, "out"), Error);
 }
 

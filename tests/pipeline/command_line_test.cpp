@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "patina/base/files.h"
-#include "patina/pipeline/bundled_model.h"
 #include "patina/pipeline/options.h"
 #include "process.h"
 #include "support.h"
@@ -69,6 +68,46 @@ TEST(CommandLine, wrong_usage_is_exit_code_2) {
                  {"rubber duck", "it has"});
 }
 
+TEST(CommandLine, options_that_a_command_does_not_use_are_refused_by_name) {
+  const TemporaryFolder folder;
+  const std::string run = folder.path().string();
+  const auto expect = [](const std::vector<std::string>& arguments, const std::vector<std::string>& words) {
+    const ProcessResult result = patina(arguments);
+    EXPECT_EQ(result.exit_code, 2) << result.error;
+    for (const std::string& word : words)
+      EXPECT_NE(result.error.find(word), std::string::npos) << word << " is not in: " << result.error;
+  };
+  expect({"report", run, "-o", "x.glb"}, {"`patina report` does not use -o", "`patina fit`"});
+  expect({"report", run, "--environment", "sky.hdr"}, {"does not use --environment"});
+  expect({"detail", run, "--output=x.glb"}, {"`patina detail` does not use --output"});
+  expect({"detail", run, "--views", "4"}, {"does not use --views", "`patina render`"});
+  expect({"fit", run, "--low-memory"}, {"does not use --low-memory"});
+  expect({"render", kettle(), "-p", "rust"}, {"does not use -p"});
+}
+
+TEST(CommandLine, a_misspelt_option_is_answered_with_what_was_meant) {
+  const auto expect = [](const std::string& given, const std::string& meant) {
+    const ProcessResult result = patina({"enhance", "a.glb", given, "1"});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.error.find("did you mean " + meant + "?"), std::string::npos) << result.error;
+  };
+  expect("--promt", "--prompt");
+  expect("--strenght", "--strength");
+  expect("--fit-iteration", "--fit-iterations");
+  expect("--guidance_scale", "--guidance-scale");
+  const ProcessResult far = patina({"enhance", "a.glb", "--colour-of-the-sky", "1"});
+  EXPECT_EQ(far.error.find("did you mean"), std::string::npos) << far.error;
+  EXPECT_NE(far.error.find("there is no option --colour-of-the-sky"), std::string::npos) << far.error;
+}
+
+TEST(CommandLine, a_config_file_may_hold_options_of_other_commands) {
+  const TemporaryFolder folder;
+  write_file(folder.path() / "all.toml", std::string_view("prompt = \"moss\"\nviews = 4\nturntable = 3\n"));
+  const ProcessResult result = patina(
+      {"report", (folder.path() / "none").string(), "--config", (folder.path() / "all.toml").string()});
+  EXPECT_EQ(result.exit_code, 1) << result.error;  // there is no such run folder
+}
+
 TEST(CommandLine, missing_and_wrong_inputs_are_named) {
   const TemporaryFolder folder;
   expect_refused(1, {"no-such.glb", "-p", "rust", "-m", model()}, {"no-such.glb", "no such file"});
@@ -83,7 +122,6 @@ TEST(CommandLine, missing_and_wrong_inputs_are_named) {
 
 TEST(CommandLine, wrong_models_are_refused_before_anything_is_rendered) {
   const TemporaryFolder folder;
-  if (pipeline::bundled_model().empty()) expect_refused(2, {kettle(), "-p", "rust"}, {"--model"});
   expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "none").string()}, {"none"});
   write_file(folder.path() / "model.ckpt", std::string_view("\x80\x02}q"));
   expect_refused(1, {kettle(), "-p", "rust", "-m", (folder.path() / "model.ckpt").string()},

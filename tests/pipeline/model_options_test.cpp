@@ -12,7 +12,7 @@ namespace {
 void set(Config& config, const std::string& name, std::vector<std::string> values) {
   const Option* option = find_option(name);
   ASSERT_NE(option, nullptr) << name;
-  option->set(config, values);
+  option->set(config, value_of_texts(*option, values));
 }
 
 TEST(ModelOptions, a_lora_is_a_file_and_how_much_of_it) {
@@ -20,8 +20,8 @@ TEST(ModelOptions, a_lora_is_a_file_and_how_much_of_it) {
   set(config, "lora", {"grime:0.8", "C:\\models\\rust.safetensors:-0.25", "plain.safetensors"});
   const std::vector<diffusion::LoraChoice> expected{
       {"grime", 0.8f}, {"C:\\models\\rust.safetensors", -0.25f}, {"plain.safetensors", 1.0f}};
-  EXPECT_EQ(config.model.loras, expected);
-  for (const char* wrong : {"grime:much", "grime:", ":0.5", "grime:11"})
+  EXPECT_EQ(config.edit.model.loras, expected);
+  for (const char* wrong : {"grime:much", "grime:", ":0.5", "grime:11", "grime:1x"})
     EXPECT_THROW(set(config, "lora", {wrong}), Error) << wrong;
 }
 
@@ -37,10 +37,10 @@ TEST(ModelOptions, survive_a_round_trip_through_json) {
   Config again;
   apply_json(again, nlohmann::json::parse(to_json(config).dump()), "test");
   EXPECT_EQ(to_json(again), to_json(config));
-  EXPECT_EQ(again.model.loras, config.model.loras);
-  EXPECT_EQ(again.model.embeddings.size(), 2u);
-  EXPECT_EQ(again.model.prediction, diffusion::PredictionChoice::kV);
-  EXPECT_EQ(again.detail.clip_skip, 2);
+  EXPECT_EQ(again.edit.model.loras, config.edit.model.loras);
+  EXPECT_EQ(again.edit.model.embeddings.size(), 2u);
+  EXPECT_EQ(again.edit.model.prediction, diffusion::PredictionChoice::kV);
+  EXPECT_EQ(again.edit.options.clip_skip, 2);
 }
 
 test::ProcessResult patina(std::vector<std::string> arguments) {

@@ -1,13 +1,11 @@
 // The list of options: every option can be written and read back, ranges are checked, names are unique.
 #include "patina/pipeline/options.h"
-#include "patina/pipeline/bundled_model.h"
 
 #include <set>
 
 #include <gtest/gtest.h>
 
 #include "patina/base/error.h"
-#include "patina/pipeline/bundled_model.h"
 #include "support.h"
 
 namespace patina::pipeline {
@@ -25,7 +23,7 @@ std::string message_of(const std::function<void()>& action) {
 void set(Config& config, const std::string& name, std::vector<std::string> values) {
   const Option* option = find_option(name);
   ASSERT_NE(option, nullptr) << name;
-  option->set(config, values);
+  option->set(config, value_of_texts(*option, values));
 }
 
 TEST(Options, names_and_aliases_are_unique_and_explained) {
@@ -58,10 +56,10 @@ TEST(Options, every_value_survives_a_round_trip_through_json) {
   Config again;
   apply_json(again, nlohmann::json::parse(to_json(config).dump()), "test");
   EXPECT_EQ(to_json(again), to_json(config));
-  EXPECT_EQ(again.seed, 18446744073709551615u);
-  EXPECT_TRUE(has(again.fit.maps, asset::MapSlot::kMetallic));
-  EXPECT_FALSE(has(again.fit.maps, asset::MapSlot::kRoughness));
-  EXPECT_TRUE(again.detail.bias_controlnet);
+  EXPECT_EQ(again.render.seed, 18446744073709551615u);
+  EXPECT_TRUE(has(again.fit.options.maps, asset::MapSlot::kMetallic));
+  EXPECT_FALSE(has(again.fit.options.maps, asset::MapSlot::kRoughness));
+  EXPECT_TRUE(again.edit.options.bias_controlnet);
 }
 
 TEST(Options, defaults_shown_are_the_defaults_used) {
@@ -75,9 +73,8 @@ TEST(Options, defaults_shown_are_the_defaults_used) {
 
 TEST(Options, a_value_out_of_range_names_option_range_and_value) {
   Config config;
-  const std::string message =
-      message_of([&] { find_option("strength")->set(config, std::vector<std::string>{"1.5"}); });
-  EXPECT_NE(message.find("--strength"), std::string::npos) << message;
+  const std::string message = message_of([&] { set(config, "strength", {"1.5"}); });
+  EXPECT_EQ(message.find("strength: "), 0u) << message;
   EXPECT_NE(message.find("from 0.01 to 1"), std::string::npos) << message;
   EXPECT_NE(message.find("1.5"), std::string::npos) << message;
 }
@@ -94,44 +91,59 @@ TEST(Options, refuses_what_is_no_number_or_no_choice) {
                                                                                     {"exposure", "bright"},
                                                                                     {"bias-controlnet", "1"},
                                                                                     {"seed", "-1"}}) {
-    EXPECT_THROW(find_option(name)->set(config, std::vector<std::string>{value}), Error)
-        << name << " " << value;
+    EXPECT_THROW(set(config, name, {value}), Error) << name << " " << value;
   }
-  EXPECT_NE(message_of([&] {
-              find_option("scheduler")->set(config, std::vector<std::string>{"magic"});
-            }).find("unipc"),
-            std::string::npos);
+  EXPECT_NE(message_of([&] { set(config, "scheduler", {"magic"}); }).find("unipc"), std::string::npos);
 }
 
-TEST(Options, a_stage_depends_on_what_it_reads_and_on_nothing_else) {
+TEST(Options, lists_are_separated_by_spaces_or_commas) {
   Config config;
-  const auto before_render = values_read_by(config, kRenderStage),
-             before_detail = values_read_by(config, kDetailStage);
-  set(config, "prompt", {"moss"});
-  EXPECT_EQ(values_read_by(config, kRenderStage), before_render);
-  EXPECT_NE(values_read_by(config, kDetailStage), before_detail);
+  set(config, "elevation", {"20,50"});
+  EXPECT_EQ(config.inputs.orbit.elevations.size(), 2u);
+  set(config, "elevation", {"-20", "20", "50"});
+  EXPECT_EQ(find_option("elevation")->get(config), nlohmann::json({-20.0, 20.0, 50.0}));
+  set(config, "fit", {"normal", "base_color,metallic"});
+  EXPECT_EQ(find_option("fit")->get(config), nlohmann::json({"base_color", "metallic", "normal"}));
+  set(config, "material", {"lid, polished", "body"});  // a name may hold a comma
+  EXPECT_EQ(config.inputs.materials.size(), 2u);
+  EXPECT_THROW(set(config, "elevation", {"20,"}), Error);
+}
+
+TEST(Options, files_hold_typed_values) {
+  Config config;
+  apply_json(config, {{"steps", 12}, {"elevation", 35.5}, {"bias-controlnet", true}}, "file.json");
+  EXPECT_EQ(config.edit.options.num_steps, 12);
+  EXPECT_EQ(config.inputs.orbit.elevations.size(), 1u);
+  for (const auto& [name, value] : std::vector<std::pair<std::string, nlohmann::json>>{
+           {"steps", "12"}, {"steps", 12.5}, {"bias-controlnet", "true"}, {"prompt", 3}, {"fit", 1}})
+    EXPECT_THROW(apply_json(config, {{name, value}}, "file.json"), Error) << name << " " << value;
 }
 
 TEST(Options, a_preset_gives_way_to_what_is_given_beside_it) {
   Config config;
   apply_json(config, {{"views", 9}, {"preset", "fast"}, {"samples", 64}}, "file.json");
-  EXPECT_EQ(config.orbit.num_views, 9);
-  EXPECT_EQ(config.samples_per_pixel, 64);
-  EXPECT_EQ(config.detail.num_steps, 12);
+  EXPECT_EQ(config.inputs.orbit.num_views, 9);
+  EXPECT_EQ(config.render.samples_per_pixel, 64);
+  EXPECT_EQ(config.edit.options.num_steps, 12);
 }
 
 TEST(Options, what_is_not_given_comes_from_the_model) {
-  Config none, tiny;
+  Config none, bundled, named, tiny;
   settle(none);
-  EXPECT_EQ(none.model.model, bundled_model());
-  EXPECT_EQ(none.orbit.resolution, bundled_model().empty() ? 512 : 256);
-  tiny.model.model = test::data_dir() / "tiny-sd";
+  EXPECT_TRUE(none.edit.model.model.empty());
+  EXPECT_EQ(none.inputs.orbit.resolution, 512);
+  bundled.bundled_model = test::data_dir() / "tiny-sd";
+  settle(bundled);
+  EXPECT_EQ(bundled.edit.model.model, test::data_dir() / "tiny-sd");
+  EXPECT_EQ(bundled.inputs.orbit.resolution, 128);
+  named.bundled_model = test::data_dir() / "tiny-sd";
+  named.edit.model.model = "tiny-sd";
+  settle(named);
+  EXPECT_EQ(named.edit.model.model, test::data_dir() / "tiny-sd");
+  tiny.edit.model.model = test::data_dir() / "tiny-sd";
+  tiny.inputs.orbit.resolution = 320;
   settle(tiny);
-  EXPECT_EQ(tiny.orbit.resolution, 128);
-  Config given;
-  given.orbit.resolution = 320;
-  settle(given);
-  EXPECT_EQ(given.orbit.resolution, 320);
+  EXPECT_EQ(tiny.inputs.orbit.resolution, 320);
 }
 
 TEST(Options, refuses_unknown_names_in_files) {

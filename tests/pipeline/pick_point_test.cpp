@@ -25,10 +25,10 @@ struct Kettle {
   }
   static Workbench open(int num_views) {
     Config config;
-    config.asset = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
-    config.orbit.num_views = num_views;
-    config.orbit.resolution = 128;
-    return open_workbench(config, {});
+    config.inputs.asset = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+    config.inputs.orbit.num_views = num_views;
+    config.inputs.orbit.resolution = 128;
+    return open_workbench(config.inputs, {});
   }
 };
 

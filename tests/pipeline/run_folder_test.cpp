@@ -2,7 +2,10 @@
 // process owns it.
 #include "patina/pipeline/run_folder.h"
 
+#include <malloc.h>
+
 #include <chrono>
+#include <fstream>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -170,15 +173,76 @@ TEST(RunFolder, time_spent_before_a_kill_counts) {
   EXPECT_LT(run.run_stage("next", "key", {}, [] { return RunFolder::StageResult{}; }).seconds, 0.06);
 }
 
+TEST(RunFolder, refuses_a_folder_that_holds_other_files) {
+  const test::TemporaryFolder folder;
+  write_file(folder.path() / "thesis.txt", std::string_view("years of work"));
+  EXPECT_THROW(RunFolder(folder.path()), Error);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / ".lock"));
+  std::filesystem::remove(folder.path() / "thesis.txt");
+  EXPECT_NO_THROW(RunFolder(folder.path()));  // empty
+  EXPECT_NO_THROW(RunFolder(folder.path()));  // a run folder by now
+}
+
+TEST(RunFolder, a_picture_that_was_changed_by_hand_is_copied_before_its_stage_runs_again) {
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  CountingStage stage{run};
+  stage("key 1", "detail/edited_01.png");
+  write_file(run.file("detail/edited_01.png"), "painted");
+  stage("key 2", "detail/edited_01.png");
+  EXPECT_EQ(read_text_file(run.file("detail/edited_01.png")), "key 2");
+  EXPECT_EQ(read_text_file(run.file("detail/edited_01.by-hand.png")), "painted");
+
+  write_file(run.file("detail/edited_01.png"), "painted again");
+  run.keep_what_was_changed_by_hand(true);
+  stage("key 3", "detail/edited_01.png");
+  EXPECT_EQ(read_text_file(run.file("detail/edited_01.png")), "painted again");
+  EXPECT_EQ(read_text_file(run.file("detail/edited_01.by-hand-2.png")), "painted again");
+  stage("key 4", "detail/edited_01.png");  // it still counts as changed
+  EXPECT_EQ(read_text_file(run.file("detail/edited_01.png")), "painted again");
+}
+
+TEST(RunFolder, outputs_that_a_stage_no_longer_makes_are_removed) {
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  CountingStage stage{run};
+  stage("key 1", "textures/lid.png");
+  stage("key 2", "textures/body.png");
+  EXPECT_FALSE(std::filesystem::exists(run.file("textures/lid.png")));
+  run.clear();
+  EXPECT_FALSE(std::filesystem::exists(run.file("textures/body.png")));
+  EXPECT_EQ(run.stage("work"), nullptr);
+}
+
+TEST(RunFolder, tells_which_stages_run_and_which_are_reused) {
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  std::vector<StageEvent> events;
+  RunProgress progress;
+  progress.on_stage = [&](std::string_view stage, StageEvent event) {
+    EXPECT_EQ(stage, "work");
+    events.push_back(event);
+  };
+  for (int i = 0; i < 2; ++i) run.run_stage("work", "key", progress, [] { return RunFolder::StageResult{}; });
+  EXPECT_EQ(events, (std::vector{StageEvent::kStarted, StageEvent::kFinished, StageEvent::kReused}));
+}
+
 TEST(RunFolder, memory_that_was_freed_before_a_stage_is_not_counted_as_its_own) {
 #if defined(__SANITIZE_ADDRESS__)
   GTEST_SKIP() << "the address sanitiser keeps freed memory";
 #endif
   const test::TemporaryFolder folder;
   RunFolder run(folder.path() / "run");
+  // A program may reset the kernel's mark when a stage starts; the library leaves the process alone.
+  RunProgress progress;
+  progress.on_stage = [](std::string_view, StageEvent event) {
+    if (event != StageEvent::kStarted) return;
+    ::malloc_trim(0);
+    std::ofstream("/proc/self/clear_refs") << "5";
+  };
   const auto peak_of = [&](const char* name, size_t blocks) {
     return run
-        .run_stage(name, "key", {},
+        .run_stage(name, "key", progress,
                    [&] {
                      // Blocks below malloc's threshold for mappings of their own stay in its arena when
                      // freed.

@@ -21,16 +21,16 @@ using test::TemporaryFolder;
 
 Config small_config(const fs::path& run) {
   Config config;
-  config.asset = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+  config.inputs.asset = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
   config.run = run;
-  config.model.model = test::data_dir() / "tiny-sd";
-  config.detail.prompt = "a rusty old kettle";
-  config.detail.num_steps = 4;
-  config.detail.strength = 0.5f;
-  config.detail.bias_weight = 2;
-  config.orbit.num_views = 4;
-  config.orbit.resolution = 64;
-  config.samples_per_pixel = 2;
+  config.edit.model.model = test::data_dir() / "tiny-sd";
+  config.edit.options.prompt = "a rusty old kettle";
+  config.edit.options.num_steps = 4;
+  config.edit.options.strength = 0.5f;
+  config.edit.options.bias_weight = 2;
+  config.inputs.orbit.num_views = 4;
+  config.inputs.orbit.resolution = 64;
+  config.render.samples_per_pixel = 2;
   return config;
 }
 
@@ -126,8 +126,8 @@ TEST(ShowAttention, wrong_requests_are_refused_with_what_would_do) {
   options = {.evaluation = 3};
   expect(message(config, options), "expected 1 to 2");
   Config without = config;
-  without.detail.bias_weight = 0;
-  expect(message(without, {}), "--bias");
+  without.edit.options.bias_weight = 0;
+  expect(message(without, {}), "bias: expected other than 0");
 }
 
 TEST(ShowAttention, runs_from_the_command_line) {
@@ -136,11 +136,11 @@ TEST(ShowAttention, runs_from_the_command_line) {
   const fs::path out = folder.path() / "attention.png";
   std::vector<std::string> command{test::built_program("patina").string(),
                                    "show-attention",
-                                   config.asset.string(),
+                                   config.inputs.asset.string(),
                                    "-p",
                                    "rust",
                                    "-m",
-                                   config.model.model.string(),
+                                   config.edit.model.model.string(),
                                    "--views",
                                    "4",
                                    "--resolution",

@@ -15,7 +15,6 @@
 #include "patina/asset/asset.h"
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
-#include "patina/pipeline/bundled_model.h"
 #include "patina/pipeline/enhance.h"
 #include "strip.h"
 
@@ -96,34 +95,33 @@ fs::path picture_path(const std::string& name, const Arguments& arguments) {
 /// What entry asks for; the other options are patina's defaults.
 pipeline::Config config_of(const Entry& entry, const Arguments& arguments) {
   pipeline::Config config;
-  config.asset = asset_path(entry, arguments);
-  config.detail.prompt = entry.prompt;
-  config.detail.strength = entry.strength;
-  config.model.model = arguments.model;
-  config.turntable_frames = 0;
+  config.inputs.asset = asset_path(entry, arguments);
+  config.edit.options.prompt = entry.prompt;
+  config.edit.options.strength = entry.strength;
+  config.edit.model.model = arguments.model;
+  config.report.turntable_frames = 0;
   return config;
 }
 
 void make_picture(const Entry& entry, const Arguments& arguments) {
   pipeline::Config config = config_of(entry, arguments);
   config.output = arguments.work / (std::string(entry.name) + ".glb");
-  pipeline::settle(config);
   fs::create_directories(arguments.work);
   const fs::path folder = pipeline::run_folder_path(config);
   {
     pipeline::RunFolder run(folder);
-    pipeline::enhance(config, run, tools::console_progress());
+    pipeline::enhance(config, run, {tools::console_progress()});
   }
   write_image(picture_path(entry.name, arguments),
-              make_gallery::strip(folder, asset::read_asset(config.asset), asset::read_asset(config.output),
-                                  entry.view, entry.other_view, kSide));
+              make_gallery::strip(folder, asset::read_asset(config.inputs.asset),
+                                  asset::read_asset(config.output), entry.view, entry.other_view, kSide));
 }
 
 void make_sheet(const make_gallery::OptionSheet& sheet, const Arguments& arguments) {
   std::vector<pipeline::Config> edits;
   for (const Entry& entry : kSheetEdits) {
     edits.push_back(config_of(entry, arguments));
-    edits.back().orbit.num_views = 4;
+    edits.back().inputs.orbit.num_views = 4;
   }
   write_image(picture_path("option_" + sheet.option, arguments),
               make_gallery::option_sheet(sheet, edits, arguments.work / "options", kSheetEdits[0].view, kSide,

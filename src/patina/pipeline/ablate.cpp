@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
-#include "patina/base/files.h"
 #include "patina/base/parallel.h"
 #include "patina/pipeline/ablate_pictures.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/measures.h"
 #include "patina/pipeline/options.h"
+#include "patina/pipeline/stage_key.h"
 #include "patina/report/html.h"
 #include "patina/report/report.h"
 
@@ -38,8 +38,8 @@ Run open_run(const AblationStep& step) {
 }
 
 // A note that every step would repeat is said once.
-Progress saying_once(const Progress& progress) {
-  Progress once = progress;
+RunProgress saying_once(const RunProgress& progress) {
+  RunProgress once = progress;
   once.on_warning = [progress, said = std::make_shared<std::set<std::string>>()](std::string_view text) {
     if (said->emplace(text).second) progress.warn(text);
   };
@@ -48,9 +48,9 @@ Progress saying_once(const Progress& progress) {
 
 // Progress of one task inside of step `index` of `count`, told as progress over all steps. What is not run
 // again is not told, so that the time left follows from what is.
-Progress of_all_steps(const Progress& progress, std::string_view task, size_t index, size_t count,
-                      std::string_view told_as) {
-  Progress inner = progress;
+RunProgress of_all_steps(const RunProgress& progress, std::string_view task, size_t index, size_t count,
+                         std::string_view told_as) {
+  RunProgress inner = progress;
   inner.on_update = [=, task = std::string(task), told_as = std::string(told_as)](std::string_view name,
                                                                                   double done, double total) {
     if (name == task)
@@ -62,16 +62,16 @@ Progress of_all_steps(const Progress& progress, std::string_view task, size_t in
 // Numbers that need the edited views alone: how well they agree, and how much detail they have over the
 // renders.
 void measure_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                   Run& run, const Progress& progress) {
-  std::string key = bench.scene_hash + cameras_to_json(bench.cameras).dump() + PATINA_VERSION +
-                    fmt::format("{}", run.step.config.fit.boundary_pixels) +
-                    json(run.step.config.materials).dump();
-  for (const std::span<const Image> images : {std::span<const Image>(views.tile), edited})
-    for (const Image& image : images)
-      key += hash_bytes(
-          {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
-  run.folder->run_stage("measure", hash_text(key), progress, [&] {
-    const std::vector<Image> weights = measure_weights(bench, views, run.step.config);
+                   Run& run, const RunProgress& progress) {
+  const int boundary_pixels = run.step.config.report.boundary_pixels;
+  const std::string key = StageKey(bench)
+                              .add_materials(bench)
+                              .add(fmt::format("{}", boundary_pixels))
+                              .add(views.tile)
+                              .add(edited)
+                              .hash();
+  run.folder->run_stage("measure", key, progress, [&] {
+    const std::vector<Image> weights = measure_weights(bench, views, boundary_pixels);
     return RunFolder::StageResult{
         .outputs = {},
         .metrics = {{"consistency", consistency_metrics(bench, views, edited)},
@@ -153,8 +153,8 @@ std::string machine_name() {
 report::ViewCountRow view_count_row(const Run& run) {
   const AblationMeasures m = measures_of(*run.folder, false);
   const StageRecord* detail = run.folder->stage("detail");
-  return {.num_views = run.step.config.orbit.num_views,
-          .resolution = run.step.config.orbit.resolution,
+  return {.num_views = run.step.config.inputs.orbit.num_views,
+          .resolution = run.step.config.inputs.orbit.resolution,
           .num_latent_pixels = detail ? detail->metrics.value("latent_pixels", int64_t{0}) : 0,
           .noise_seconds = m.noise_seconds,
           .correspond_seconds = m.correspond_seconds,
@@ -166,14 +166,13 @@ report::ViewCountRow view_count_row(const Run& run) {
 std::vector<AblationStep> steps_of_more_views(const AblationStep& last, const AblationOptions& options,
                                               const fs::path& folder) {
   std::vector<AblationStep> steps;
-  std::set<int> counts{last.config.orbit.num_views};
+  std::set<int> counts{last.config.inputs.orbit.num_views};
   for (const int count : options.view_counts) {
     if (!counts.insert(count).second) continue;
-    if (!last.config.cameras.empty())
-      throw Error(ErrorCode::kUsage, "--views",
-                  "explicit cameras (--cameras) fix the number of views; give one");
+    if (!last.config.inputs.cameras.empty())
+      throw Error(ErrorCode::kUsage, "views", "explicit cameras fix the number of views; give one");
     AblationStep step = last;
-    step.config.orbit.num_views = count;
+    step.config.inputs.orbit.num_views = count;
     step.config.run = folder / fmt::format("views-{}", count);
     steps.push_back(std::move(step));
   }
@@ -182,8 +181,9 @@ std::vector<AblationStep> steps_of_more_views(const AblationStep& last, const Ab
 
 // Refuses an asset that cannot be used, and a point that is none, before folders are made and hours have
 // passed.
-void check_asset_and_point(const Config& config, const AblationOptions& options, const Progress& progress) {
-  const Workbench bench = open_workbench(config, progress);
+void check_asset_and_point(const Config& config, const AblationOptions& options,
+                           const RunProgress& progress) {
+  const Workbench bench = open_workbench(config.inputs, progress);
   views::ViewSet views{.grid = views::grid_of(bench.cameras.size()), .exposure_ev = 0, .views = {}};
   for (const render::Camera& camera : bench.cameras)
     views.views.push_back({.camera = camera,
@@ -195,14 +195,14 @@ void check_asset_and_point(const Config& config, const AblationOptions& options,
 
 // Renders the views once and edits them in every run of `runs`, which differ in nothing that renders depend
 // on. Asset and G-buffers go when this returns, so that they do not count as another stage's memory.
-void edit(std::span<Run> runs, std::string_view told_as, size_t first, size_t count,
-          std::optional<diffusion::Model>& model, const Progress& progress) {
-  const Workbench bench = open_workbench(runs[0].step.config, progress);
-  const RenderedViews views = render_stage(bench, runs[0].step.config, *runs[0].folder, progress);
+void edit(std::span<Run> runs, std::string_view told_as, size_t first, size_t count, ResolvedModel& model,
+          const RunProgress& progress) {
+  const Workbench bench = open_workbench(runs[0].step.config.inputs, progress);
+  const RenderedViews views = render_stage(bench, runs[0].step.config.render, *runs[0].folder, progress);
   for (size_t i = 0; i < runs.size(); ++i) {
     runs[i].folder->adopt_stage(*runs[0].folder, "render");
-    detail_stage(bench, views, runs[i].step.config, *runs[i].folder,
-                 of_all_steps(progress, "detail", first + i, count, told_as), &model);
+    edit_stage(bench, views, runs[i].step.config.edit, model, *runs[i].folder,
+               of_all_steps(progress, "detail", first + i, count, told_as));
   }
 }
 
@@ -219,7 +219,8 @@ report::AblationPage make_page(const Workbench& bench, const RenderedViews& view
 
   report::AblationPage page;
   page.title = bench.asset.path.filename().string();
-  page.prompt = config.detail.prompt, page.negative_prompt = negative_prompt_of(*runs[0].folder);
+  page.prompt = config.edit.options.prompt,
+  page.negative_prompt = prompts_of(*runs[0].folder).negative_prompt;
   for (const CropWindow& window : windows)
     page.crop_titles.push_back(fmt::format("View {}", window.view + 1));
   page.conditioning = pictures_of(views.tile, windows, true);
@@ -247,8 +248,9 @@ report::AblationPage make_page(const Workbench& bench, const RenderedViews& view
   const render::Camera& camera = bench.cameras[0];
   page.facts = {
       fmt::format("<b>{}</b> views of <b>{} × {}</b>", bench.cameras.size(), camera.width, camera.height),
-      fmt::format("<b>{}</b> steps at strength <b>{}</b>", config.detail.num_steps, config.detail.strength),
-      fmt::format("seed <b>{}</b>", config.seed)};
+      fmt::format("<b>{}</b> steps at strength <b>{}</b>", config.edit.options.num_steps,
+                  config.edit.options.strength),
+      fmt::format("seed <b>{}</b>", config.edit.options.seed)};
   if (const StageRecord* detail = runs[0].folder->stage("detail"))
     page.facts.push_back(report::escaped(detail->metrics.value("model", "")));
   page.machine = machine_name();
@@ -256,7 +258,7 @@ report::AblationPage make_page(const Workbench& bench, const RenderedViews& view
   for (const char* set_by_the_steps : {"bias", "bias-scaling", "noise", "output", "run", "turntable"})
     page.config.erase(set_by_the_steps);
   page.config["tile-scale"] = find_option("tile-scale")->get(config);
-  page.config["asset"] = config.asset.string();
+  page.config["asset"] = config.inputs.asset.string();
   page.config["version"] = PATINA_VERSION;
   page.warnings = bench.warnings;
   if (const StageRecord* render = runs[0].folder->stage("render"))
@@ -266,39 +268,41 @@ report::AblationPage make_page(const Workbench& bench, const RenderedViews& view
 
 }  // namespace
 
-json ablate(const Config& config, const AblationOptions& options, const fs::path& folder,
-            const Progress& progress) {
+json ablate(Config config, const AblationOptions& options, const fs::path& folder,
+            const RunProgress& progress) {
+  settle(config);
   const std::vector<AblationStep> steps = ablation_steps(config, options, folder);
   const std::vector<AblationStep> more_steps = steps_of_more_views(steps.back(), options, folder);
   std::vector<Run> runs, more_runs;
   for (const AblationStep& step : steps) check_inputs(step.config);
-  const Progress once = saying_once(progress);
+  ResolvedModel model(config.edit);
+  const RunProgress once = saying_once(progress);
   check_asset_and_point(steps[0].config, options, once);
   for (const AblationStep& step : steps) runs.push_back(open_run(step));
   for (const AblationStep& step : more_steps) more_runs.push_back(open_run(step));
 
   // All edits first, with one model; then it goes, so that its memory does not count as the fit's.
-  std::optional<diffusion::Model> model;
   edit(runs, "edit steps", 0, runs.size(), model, once);
   for (size_t i = 0; i < more_runs.size(); ++i)
     edit({&more_runs[i], 1}, "more views", i, more_runs.size(), model, once);
-  model.reset();
+  model.unload();
 
-  const Workbench bench = open_workbench(runs[0].step.config, once);
+  const Workbench bench = open_workbench(runs[0].step.config.inputs, once);
   const RenderedViews views = load_views(bench, *runs[0].folder);
   for (size_t i = 0; i < runs.size(); ++i) {
     const std::vector<Image> edited = load_edited(views, *runs[i].folder);
     measure_stage(bench, views, edited, runs[i], once);
     if (!options.fit) continue;
-    const Progress inner = of_all_steps(once, "fit", i, runs.size(), "fit steps");
+    const RunProgress inner = of_all_steps(once, "fit", i, runs.size(), "fit steps");
     const FittedMaterials fitted =
-        fit_stage(bench, views, edited, runs[i].step.config, *runs[i].folder, inner);
-    report_stage(bench, views, edited, fitted, runs[i].step.config, *runs[i].folder, inner);
+        fit_stage(bench, views, edited, runs[i].step.config.fit, *runs[i].folder, inner);
+    report_stage(bench, views, edited, fitted, runs[i].step.config.report, *runs[i].folder, inner);
   }
 
   report::AblationPage page = make_page(bench, views, runs, options, config);
-  json result = {{"patina", PATINA_VERSION},    {"asset", config.asset.string()}, {"options", page.config},
-                 {"machine", page.machine},     {"views", bench.cameras.size()},  {"steps", json::array()},
+  json result = {{"patina", PATINA_VERSION},      {"asset", config.inputs.asset.string()},
+                 {"options", page.config},        {"machine", page.machine},
+                 {"views", bench.cameras.size()}, {"steps", json::array()},
                  {"view_counts", json::array()}};
   for (size_t i = 0; i < runs.size(); ++i) {
     json step = to_json(page.steps[i].measures, options.fit);

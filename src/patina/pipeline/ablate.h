@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "patina/base/progress.h"
 #include "patina/pipeline/config.h"
 #include "patina/pipeline/pick_point.h"
+#include "patina/pipeline/run_progress.h"
 
 namespace patina::pipeline {
 
@@ -41,7 +41,7 @@ std::vector<AblationStep> ablation_steps(const Config& config, const AblationOpt
 /// Runs all steps into `folder`, and writes ablation.html and ablation.json there. The views are rendered and
 /// the model is loaded once. A step that is there from earlier is not run again; one that was killed goes on
 /// where it stood. Progress counts steps: "edit steps", "fit steps", "more views". Returns ablation.json.
-nlohmann::json ablate(const Config& config, const AblationOptions& options,
-                      const std::filesystem::path& folder, const Progress& progress);
+nlohmann::json ablate(Config config, const AblationOptions& options, const std::filesystem::path& folder,
+                      const RunProgress& progress);
 
 }  // namespace patina::pipeline

@@ -63,9 +63,8 @@ report::AblationRow pictures_of(std::span<const Image> views, std::span<const Cr
     const Image& view = views[static_cast<size_t>(window.view)];
     row.crops.push_back(cropped(view, window));
     if (framed)
-      shown[static_cast<size_t>(window.view)] =
-          report::with_frame(view, window.left, window.top, window.side, window.side, kFrameColor,
-                             std::max(1, view.width / 64));
+      shown[static_cast<size_t>(window.view)] = report::with_frame(
+          view, window.left, window.top, window.side, window.side, kFrameColor, std::max(1, view.width / 64));
   }
   const Image grid = views::tile_grid(shown);
   const double scale = std::min(1.0, static_cast<double>(kGridSide) / std::max(grid.width, grid.height));

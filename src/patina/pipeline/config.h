@@ -1,16 +1,13 @@
-// Everything a run of patina can be told, in one aggregate. Options (options.h) fill it; stages read it.
+// Everything a run of patina can be told, in one aggregate. Options (options.h) fill it; each stage is given
+// its part of it (settings.h).
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "patina/correspond/noise.h"
-#include "patina/diffusion/options.h"
-#include "patina/inverse/fit_options.h"
-#include "patina/render/path_tracer.h"
+#include "patina/pipeline/settings.h"
+#include "patina/render/scene.h"
 #include "patina/views/view_set.h"
 
 namespace patina::pipeline {
@@ -18,41 +15,36 @@ namespace patina::pipeline {
 /// What --preset chose; its values are written into the other fields.
 enum class Preset { kUsual, kFast, kQuality };
 
-struct Config {
-  Preset preset = Preset::kUsual;
-
-  // What goes in and out.
+/// What every stage works on: files, and the cameras. Read anew by every command (workbench.h); stages have
+/// the content in their keys.
+struct InputSettings {
   std::filesystem::path asset;
-  std::filesystem::path output;        // empty: no export
-  std::filesystem::path run;           // empty: beside the output, <output stem>.patina-run
-  std::vector<std::string> materials;  // names of the materials that may change; empty: all that can
-
-  // How it is lit and seen.
+  std::vector<std::string> materials;          // names of the materials that may change; empty: all that can
   std::filesystem::path environment;           // empty: the built-in studio
   std::filesystem::path scene;                 // context that is rendered and never changed; may be empty
   std::filesystem::path cameras;               // explicit cameras instead of the orbit; may be empty
   views::OrbitOptions orbit{.resolution = 0};  // 0: what the model was trained at, see settle()
-  int samples_per_pixel = 64;
-  int max_depth = 6;
-  std::optional<float> exposure_ev;  // nullopt: automatic
   render::BsdfModel bsdf = render::BsdfModel::kGltf;
-
-  // What the diffusion model does.
-  diffusion::ModelPaths model;
-  diffusion::Dtype dtype = diffusion::Dtype::kAuto;
-  diffusion::Device device = diffusion::Device::kAuto;
-  bool low_memory = false;
-  diffusion::EditOptions detail{.bias_weight = 1.8f};  // docs/decisions/0012
-  correspond::NoiseMode noise = correspond::NoiseMode::kExact;
-
-  // How the detail is carried into the textures.
-  inverse::FitOptions fit;
-
-  // The report.
-  int turntable_frames = 24;  // 0: no turntable
-
-  uint64_t seed = 0;    // of all random numbers
-  int num_threads = 0;  // 0: all processors
 };
+
+struct Config {
+  Preset preset = Preset::kUsual;
+  std::filesystem::path output;  // empty: no export
+  std::filesystem::path run;     // empty: beside the output, <output stem>.patina-run
+  bool keep = false;             // what was changed by hand in the run folder stays when its stage runs again
+
+  InputSettings inputs;
+  RenderSettings render;
+  EditSettings edit;
+  FitSettings fit;
+  ReportSettings report;
+
+  int num_threads = 0;                  // 0: all processors; the program applies it
+  std::filesystem::path bundled_model;  // the folder of patina-mini that the program found; may be empty
+};
+
+/// Fills in what depends on the model: the bundled one where none is given or where its name is, and the
+/// resolution that the model was trained at where none is given.
+void settle(Config& config);
 
 }  // namespace patina::pipeline

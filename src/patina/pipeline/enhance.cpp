@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <cctype>
+
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
@@ -14,75 +16,129 @@ namespace patina::pipeline {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-void enhance(const Config& config, RunFolder& run, const Progress& progress) {
+namespace {
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+}  // namespace
+
+void enhance(Config config, RunFolder& run, const RunProgress& progress) {
+  settle(config);
   check_inputs(config);
+  ResolvedModel model(config.edit);
   write_config(config, run);
-  const Workbench bench = open_workbench(config, progress);                // asset, scene, cameras
-  const RenderedViews views = render_stage(bench, config, run, progress);  // → views/
-  const std::vector<Image> edited = detail_stage(bench, views, config, run, progress);    // → detail/
-  const FittedMaterials fitted = fit_stage(bench, views, edited, config, run, progress);  // → textures/
-  write_output(bench, fitted, config);                                                    // → the asset
-  report_stage(bench, views, edited, fitted, config, run, progress);                      // → report.html
+  const Workbench bench = open_workbench(config.inputs, progress);                // asset, scene, cameras
+  const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
+  const std::vector<Image> edited = edit_stage(bench, views, config.edit, model, run, progress);  // → detail/
+  model.unload();
+  const FittedMaterials fitted = fit_stage(bench, views, edited, config.fit, run, progress);  // → textures/
+  write_output(bench, fitted, config.output);                                                 // → the asset
+  report_stage(bench, views, edited, fitted, config.report, run, progress);  // → report.html
+}
+
+void run_render(Config config, RunFolder& run, const RunProgress& progress) {
+  settle(config);
+  check_output(config.output);
+  write_config(config, run);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  render_stage(bench, config.render, run, progress);
+}
+
+void run_edit(Config config, RunFolder& run, const RunProgress& progress) {
+  settle(config);
+  ResolvedModel model(config.edit);
+  write_config(config, run);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  edit_stage(bench, load_views(bench, run), config.edit, model, run, progress);
+}
+
+void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
+  settle(config);
+  check_output(config.output);
+  write_config(config, run);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  const RenderedViews views = load_views(bench, run);
+  const std::vector<Image> edited = load_edited(views, run);
+  write_output(bench, fit_stage(bench, views, edited, config.fit, run, progress), config.output);
+}
+
+void run_report(Config config, RunFolder& run, const RunProgress& progress) {
+  settle(config);
+  write_config(config, run);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  const RenderedViews views = load_views(bench, run);
+  report_stage(bench, views, load_edited(views, run), load_fitted(bench, run), config.report, run, progress);
 }
 
 void check_inputs(const Config& config) {
   // A U-Net halves the views three times, and each level's attention needs its own correspondences.
-  if (config.detail.bias_weight != 0 && config.cameras.empty() && config.orbit.resolution % 64 != 0)
-    throw Error(ErrorCode::kUsage, "--resolution",
-                fmt::format("expected a multiple of 64, or any multiple of 8 with --bias 0, found {}",
-                            config.orbit.resolution));
-  if (config.model.model.empty())
-    throw Error(
-        ErrorCode::kUsage, "--model",
-        "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
-        "2.x; `patina models DIR` lists those in a folder");
-  diffusion::check_device(config.device, config.dtype);
-  diffusion::check_model(config.model);
-  if (config.output.empty()) return;
-  const std::string extension = config.output.extension().string();
+  const int resolution = config.inputs.orbit.resolution;
+  if (config.edit.options.bias_weight != 0 && config.inputs.cameras.empty() && resolution % 64 != 0)
+    throw Error(ErrorCode::kUsage, "resolution",
+                fmt::format("expected a multiple of 64, or any multiple of 8 with the attention bias off, "
+                            "found {}",
+                            resolution));
+  check_output(config.output);
+}
+
+void check_output(const fs::path& output) {
+  if (output.empty()) return;
+  const std::string extension = lower_case(output.extension().string());
   if (extension != ".glb" && extension != ".gltf" && extension != ".obj")
-    throw Error(ErrorCode::kUsage, "--output",
+    throw Error(ErrorCode::kUsage, "output",
                 fmt::format("expected a name that ends in .glb, .gltf or .obj, found '{}'",
-                            printable(config.output.string())));
+                            printable(output.string())));
   // A file that is made and removed beside the output tells whether the output can be written.
-  const fs::path probe = config.output.parent_path() / fmt::format(".patina-probe.{}", ::getpid());
+  const fs::path probe = output.parent_path() / fmt::format(".patina-probe.{}", ::getpid());
   write_file(probe, std::string_view());
   std::error_code ignored;
   fs::remove(probe, ignored);
 }
 
-void write_output(const Workbench& bench, const FittedMaterials& fitted, const Config& config) {
-  if (!config.output.empty()) asset::export_asset(bench.asset, fitted.maps, fitted.changed, config.output);
+void write_output(const Workbench& bench, const FittedMaterials& fitted, const fs::path& output) {
+  if (!output.empty()) asset::export_asset(bench.asset, fitted.maps, fitted.changed, output);
 }
 
 fs::path run_folder_path(const Config& config) {
   if (!config.run.empty()) return config.run;
   if (config.output.empty())
-    throw Error(ErrorCode::kUsage, "", "give an output (-o OUT.glb) or a run folder (--run DIR)");
+    throw Error(ErrorCode::kUsage, "output", "give an output, e.g. rusty.glb, or a run folder");
   return config.output.parent_path() / (config.output.stem().string() + ".patina-run");
 }
 
-void write_config(const Config& config, const RunFolder& run) {
-  write_json(run.file("config.json"), {{"patina", PATINA_VERSION},
-                                       {"asset", fs::absolute(config.asset).string()},
-                                       {"options", to_json(config)}});
+void write_config(const Config& config, RunFolder& run) {
+  const fs::path file = run.file("config.json"), asset = fs::absolute(config.inputs.asset);
+  const std::string hash = hash_file(asset);
+  if (fs::exists(file)) {
+    const json before = read_json(file);
+    if (before.value("asset", "") != asset.string() && before.value("asset_hash", "") != hash) run.clear();
+  }
+  run.keep_what_was_changed_by_hand(config.keep);
+  write_json(file, {{"patina", PATINA_VERSION},
+                    {"asset", asset.string()},
+                    {"asset_hash", hash},
+                    {"options", to_json(config)}});
 }
 
 Config read_config(const fs::path& run_folder) {
   const fs::path file = run_folder / "config.json";
   if (!fs::exists(file))
     throw Error(ErrorCode::kNotFound, run_folder.string(),
-                "is not a run folder (it has no config.json); `patina render ASSET --run DIR` makes one");
+                "is not a run folder (it has no config.json); `patina render` makes one");
   const json values = read_json(file);
   Config config;
   try {
-    config.asset = values.at("asset").get<std::string>();
+    config.inputs.asset = values.at("asset").get<std::string>();
     apply_json(config, values.at("options"), file.string());
   } catch (const json::exception& e) {
     throw Error(ErrorCode::kFormat, file.string(),
                 fmt::format("is not a patina configuration: {}", e.what()));
   }
   config.run = run_folder;
+  config.keep = false;  // asked for anew each time
   return config;
 }
 

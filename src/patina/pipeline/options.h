@@ -1,5 +1,5 @@
-// The one list of options. The command line, the config file, config.json and the check whether a stage must
-// run again are all made from it, so an option is added in one place.
+// The one list of options. The command line, config files and config.json are all made from it, so an option
+// is added in one place: the table of its group (option_groups.h), and the field in settings.h or config.h.
 #pragma once
 
 #include <functional>
@@ -14,31 +14,43 @@
 
 namespace patina::pipeline {
 
-/// Stages as bits: which of them read an option.
-enum StageBits : unsigned {
-  kNoStage = 0,
-  kRenderStage = 1,
-  kDetailStage = 2,
-  kFitStage = 4,
-  kReportStage = 8,
-  kEveryStage = 15,
+/// What an option belongs to, as bits: the input files, or the stages in whose settings it is written.
+/// Commands take the options of what they run.
+enum Part : unsigned {
+  kInputs = 1,
+  kRender = 2,
+  kEdit = 4,
+  kFit = 8,
+  kReport = 16,
+  kOutput = 32,   // the enhanced asset
+  kMachine = 64,  // every command
+  kEverything = 127,
 };
 
-struct Option {
-  std::string name = {};                  // long name without dashes; also its key in files
-  std::vector<std::string> aliases = {};  // other spellings with dashes: "-p", "--cfg-scale"
-  std::string group = {};                 // heading in --help
-  std::string placeholder = {};           // what stands for the value in --help: "TEXT", "4|9|16"
-  std::string help = {};                  // one or two sentences with the unit
-  std::string default_text = {};          // as --help shows it
-  unsigned stages = kNoStage;             // who reads it (for showing it and for re-running)
-  bool is_list = false;                   // takes several values
-  bool is_flag = false;                   // needs no value on the command line: "true"
+/// How a text becomes a typed value.
+enum class ValueKind { kText, kInteger, kNumber, kTruth };
 
-  /// Parses, checks the range and stores. Throws Error{kUsage} that states the range and what was found.
-  std::function<void(Config&, std::span<const std::string> values)> set = {};
-  /// The value as config.json keeps it: strings, numbers or lists, in the units of the command line.
-  std::function<nlohmann::json(const Config&)> get = {};
+struct Option {
+  std::string name;                   // long name without dashes; also its key in files
+  std::vector<std::string> aliases;   // other spellings with dashes: "-p", "--cfg-scale"
+  std::string group;                  // heading in --help
+  std::string placeholder;            // what stands for the value in --help: "TEXT", "4|9|16"
+  std::string help;                   // one or two sentences with the unit
+  std::string default_text;           // as --help shows it
+  unsigned parts = 0;                 // who reads it
+  ValueKind kind = ValueKind::kText;  // of one value
+  std::string word;                   // may stand in place of a number: "auto"; empty: none
+  std::string expected;               // for messages: "a number from 0.01 to 1"
+  bool is_list = false;               // takes several values
+  bool splits_at_commas = false;      // of a list: "20,50" is two values
+
+  /// Stores a value of get's form: text, number or truth value, or a list of them. Throws Error{kUsage} with
+  /// the option's name as context, which says what was expected and what was found.
+  std::function<void(Config&, const nlohmann::json& value)> set;
+  /// The value as config.json keeps it, in the units of the command line.
+  std::function<nlohmann::json(const Config&)> get;
+
+  bool is_flag() const { return kind == ValueKind::kTruth; }
 };
 
 /// All options in the order of --help.
@@ -47,14 +59,14 @@ const std::vector<Option>& options();
 /// nullptr if there is none of that name.
 const Option* find_option(std::string_view name);
 
+/// The typed value of what was written on a command line or in a file. Throws as Option::set.
+nlohmann::json value_of_texts(const Option& option, std::span<const std::string> texts);
+
 /// Every option's value.
 nlohmann::json to_json(const Config& config);
 
 /// Sets the options that `json` (an object of to_json's form) holds; throws Error{kFormat} on unknown names,
 /// with `context`.
 void apply_json(Config& config, const nlohmann::json& json, const std::string& context);
-
-/// The values that the given stages read: what decides whether a stage must run again.
-nlohmann::json values_read_by(const Config& config, unsigned stages);
 
 }  // namespace patina::pipeline

@@ -45,7 +45,7 @@ PickedPoint picked(const render::Scene& scene, const views::ViewSet& views, int 
 void check_view(const views::ViewSet& views, int view) {
   const auto num_views = static_cast<int>(views.views.size());
   if (view < 0 || view >= num_views)
-    throw Error(ErrorCode::kUsage, "--view", fmt::format("expected 1 to {}, found {}", num_views, view + 1));
+    throw Error(ErrorCode::kUsage, "view", fmt::format("expected 1 to {}, found {}", num_views, view + 1));
 }
 
 }  // namespace
@@ -64,13 +64,13 @@ PickedPoint point_at(const render::Scene& scene, const views::ViewSet& views, in
   check_view(views, view);
   const views::GBuffer& gbuffer = views.views[static_cast<size_t>(view)].gbuffer;
   if (x < 0 || y < 0 || x >= gbuffer.width || y >= gbuffer.height)
-    throw Error(ErrorCode::kUsage, "--pixel",
+    throw Error(ErrorCode::kUsage, "pixel",
                 fmt::format("a view has {} x {} pixels, counted from 0 at the top left; found {},{}",
                             gbuffer.width, gbuffer.height, x, y));
   if (!shows_asset(scene, gbuffer, index_of(gbuffer, x, y)))
     throw Error(
-        ErrorCode::kUsage, "--pixel",
-        fmt::format("view {} does not show the asset at {},{}; leave --pixel away to have a point chosen",
+        ErrorCode::kUsage, "pixel",
+        fmt::format("view {} does not show the asset at {},{}; leave the pixel away to have a point chosen",
                     view + 1, x, y));
   return picked(scene, views, view, x, y);
 }

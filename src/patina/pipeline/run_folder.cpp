@@ -8,16 +8,12 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <fstream>
 
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
+#include "patina/base/memory.h"
 
 namespace patina::pipeline {
 namespace {
@@ -25,37 +21,21 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// Largest resident memory of this process since the last reset, in MB. Linux resets the mark when 5 is
-// written to clear_refs; where that is forbidden the mark is that of the whole process, an upper bound. What
-// earlier work freed goes back to the system first, so that it is not counted as this stage's.
-void reset_peak_memory() {
-#ifdef __GLIBC__
-  ::malloc_trim(0);
-#endif
-  std::ofstream("/proc/self/clear_refs") << "5";
-}
-
 double peak_memory_mb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) return std::strtod(line.c_str() + 6, nullptr) / 1024.0;
-  return 0;
+  return static_cast<double>(peak_resident_bytes()) / 1048576;
 }
 
 json to_json(const StageRecord& stage) {
-  return {{"name", stage.name},
-          {"key", stage.key},
-          {"outputs", stage.outputs},
-          {"seconds", stage.seconds},
-          {"peak_rss_mb", stage.peak_rss_mb},
-          {"metrics", stage.metrics},
-          {"warnings", stage.warnings}};
+  return {{"name", stage.name},       {"key", stage.key},          {"outputs", stage.outputs},
+          {"hashes", stage.hashes},   {"seconds", stage.seconds},  {"peak_rss_mb", stage.peak_rss_mb},
+          {"metrics", stage.metrics}, {"warnings", stage.warnings}};
 }
 
 StageRecord stage_from_json(const json& j) {
   return {.name = j.at("name"),
           .key = j.at("key"),
           .outputs = j.at("outputs"),
+          .hashes = j.value("hashes", std::vector<std::string>()),
           .seconds = j.at("seconds"),
           .peak_rss_mb = j.at("peak_rss_mb"),
           .metrics = j.at("metrics"),
@@ -82,6 +62,11 @@ void write_json(const fs::path& path, const json& values) {
 
 RunFolder::RunFolder(const fs::path& path) : path_(path) {
   std::error_code failure;
+  if (fs::is_directory(path_, failure) && !fs::is_empty(path_, failure) && !fs::exists(path_ / ".lock") &&
+      !fs::exists(path_ / "stages.json"))
+    throw Error(ErrorCode::kUsage, "run",
+                fmt::format("'{}' holds other files and is not a run folder; choose a new or an empty one",
+                            printable(path_.string())));
   fs::create_directories(path_, failure);
   if (failure)
     throw Error(ErrorCode::kIo, path_.string(), "the run folder cannot be made: " + failure.message());
@@ -92,7 +77,7 @@ RunFolder::RunFolder(const fs::path& path) : path_(path) {
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     ::close(lock_);
     throw Error(ErrorCode::kIo, path_.string(),
-                "another patina works in this run folder; wait for it, or choose another with --run");
+                "another patina works in this run folder; wait for it, or choose another folder");
   }
   if (!fs::exists(path_ / "stages.json")) return;
   try {
@@ -140,26 +125,70 @@ double RunFolder::peak_so_far_mb() const {
 }
 
 const StageRecord& RunFolder::run_stage(std::string_view name, const std::string& key,
-                                        const Progress& progress, const std::function<StageResult()>& work) {
+                                        const RunProgress& progress,
+                                        const std::function<StageResult()>& work) {
   if (const StageRecord* last = stage(name); last && last->key == key && is_complete(*last)) {
     for (const std::string& warning : last->warnings) progress.warn(warning);
+    progress.tell_stage(name, StageEvent::kReused);
     return *last;
   }
   progress.throw_if_stopped();
-  reset_peak_memory();
+  progress.tell_stage(name, StageEvent::kStarted);
   start_ = std::chrono::steady_clock::now();
   earlier_seconds_ = earlier_peak_mb_ = 0;
+  const StageRecord before = stage(name) ? *stage(name) : StageRecord{};
+  const std::vector<ChangedByHand> changed = copy_what_was_changed_by_hand(before);
   StageResult result = work();
+  std::error_code ignored;
+  for (const std::string& output : before.outputs)  // e.g. textures of materials that are no longer chosen
+    if (std::find(result.outputs.begin(), result.outputs.end(), output) == result.outputs.end())
+      fs::remove(path_ / output, ignored);
+  std::vector<std::string> hashes;
+  for (const std::string& output : result.outputs) hashes.push_back(hash_file(path_ / output));
+  for (const auto& [output, copy] : changed) {
+    if (keep_) fs::copy_file(path_ / copy, path_ / output, fs::copy_options::overwrite_existing);
+    progress.warn(fmt::format("{} was changed by hand{} {}", output,
+                              keep_ ? " and is kept; a copy is" : "; that picture is now", copy));
+  }
   set_record({.name = std::string(name),
               .key = key,
               .outputs = std::move(result.outputs),
+              .hashes = std::move(hashes),
               .seconds = seconds_so_far(),
               .peak_rss_mb = peak_so_far_mb(),
               .metrics = std::move(result.metrics),
               .warnings = std::move(result.warnings)});
-  std::error_code ignored;
   fs::remove(path_ / checkpoint_name(name), ignored);
+  progress.tell_stage(name, StageEvent::kFinished);
   return *stage(name);
+}
+
+std::vector<RunFolder::ChangedByHand> RunFolder::copy_what_was_changed_by_hand(
+    const StageRecord& stage) const {
+  std::vector<ChangedByHand> changed;
+  for (size_t i = 0; i < stage.hashes.size() && i < stage.outputs.size(); ++i) {
+    const fs::path file = path_ / stage.outputs[i];
+    if (!fs::exists(file) || hash_file(file) == stage.hashes[i]) continue;
+    fs::path copy = file;
+    for (int n = 1; n == 1 || fs::exists(copy); ++n)
+      copy.replace_filename(fmt::format("{}.by-hand{}{}", file.stem().string(),
+                                        n == 1 ? "" : fmt::format("-{}", n), file.extension().string()));
+    fs::copy_file(file, copy);
+    changed.push_back({stage.outputs[i], fs::relative(copy, path_).string()});
+  }
+  return changed;
+}
+
+void RunFolder::clear() {
+  std::error_code ignored;
+  for (const StageRecord& stage : stages_) {
+    for (const std::string& output : stage.outputs) fs::remove(path_ / output, ignored);
+    fs::remove(path_ / checkpoint_name(stage.name), ignored);
+  }
+  for (const char* made : {"preview", "metrics.json", "report.html", "config.json"})
+    fs::remove_all(path_ / made, ignored);
+  stages_.clear();
+  write_json(path_ / "stages.json", json::array());
 }
 
 void RunFolder::adopt_stage(const RunFolder& from, std::string_view name) {

@@ -18,7 +18,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "patina/base/progress.h"
+#include "patina/pipeline/run_progress.h"
 
 namespace patina::pipeline {
 
@@ -27,8 +27,10 @@ struct StageRecord {
   std::string name;
   std::string key;                   // hash of everything the stage read
   std::vector<std::string> outputs;  // paths relative to the run folder
+  std::vector<std::string> hashes;   // of the outputs as the stage wrote them
   double seconds = 0;                // with those spent before the last checkpoint of a run that was killed
-  double peak_rss_mb = 0;            // largest resident memory while the stage ran
+  double peak_rss_mb = 0;  // largest resident memory of the process until the stage ended; while the stage
+                           // ran, where the program resets the kernel's mark when a stage starts
   nlohmann::json metrics = nlohmann::json::object();
   std::vector<std::string> warnings;  // shown again in the report
 };
@@ -36,8 +38,8 @@ struct StageRecord {
 /// One process at a time owns a run folder: the constructor takes a lock that ends with the process.
 class RunFolder {
  public:
-  /// Makes the folder if it is missing. Throws Error{kIo} if it cannot be written or another process holds
-  /// it.
+  /// Makes the folder if it is missing. Throws Error{kUsage} for a folder that holds other things, Error{kIo}
+  /// if it cannot be written or another process holds it.
   explicit RunFolder(const std::filesystem::path& path);
   ~RunFolder();
   RunFolder(const RunFolder&) = delete;
@@ -54,8 +56,15 @@ class RunFolder {
     nlohmann::json metrics = nlohmann::json::object();
     std::vector<std::string> warnings;
   };
-  const StageRecord& run_stage(std::string_view name, const std::string& key, const Progress& progress,
+  const StageRecord& run_stage(std::string_view name, const std::string& key, const RunProgress& progress,
                                const std::function<StageResult()>& work);
+
+  /// Whether outputs that were changed by hand stay in place when their stage runs again. By default they
+  /// make room for the new ones, and a copy is kept beside: "edited_01.by-hand.png".
+  void keep_what_was_changed_by_hand(bool keep) { keep_ = keep; }
+
+  /// Removes everything that stages have made here.
+  void clear();
 
   /// Records of the stages that have run, in the order of the flow; nullptr if `name` has not.
   const std::vector<StageRecord>& stages() const { return stages_; }
@@ -78,12 +87,17 @@ class RunFolder {
 
  private:
   bool is_complete(const StageRecord& stage) const;
+  struct ChangedByHand {
+    std::string output, copy;
+  };
+  std::vector<ChangedByHand> copy_what_was_changed_by_hand(const StageRecord& stage) const;
   void set_record(StageRecord record);
   double seconds_so_far() const;
   double peak_so_far_mb() const;
 
   std::filesystem::path path_;
   int lock_ = -1;
+  bool keep_ = false;
   std::vector<StageRecord> stages_;
   // Of the stage that is running: when it started here, and what a killed run had spent on it.
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

@@ -31,31 +31,30 @@ int32_t latent_pixel_at(const AttentionLayer& layer, int grid, int view, const v
 
 }  // namespace
 
-ShownAttention show_attention(const Config& config, const AttentionOptions& options, RunFolder& run,
-                              const Progress& progress) {
-  if (config.detail.bias_weight == 0)
-    throw Error(ErrorCode::kUsage, "--bias",
+ShownAttention show_attention(Config config, const AttentionOptions& options, RunFolder& run,
+                              const RunProgress& progress) {
+  settle(config);
+  if (config.edit.options.bias_weight == 0)
+    throw Error(ErrorCode::kUsage, "bias",
                 "expected other than 0: attention is shown without and with the bias");
   check_inputs(config);
-  const Workbench bench = open_workbench(config, progress);
-  const diffusion::Model model(config.model,
-                               {config.dtype, config.num_threads, config.low_memory, config.device});
+  ResolvedModel resolved(config.edit);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  const diffusion::Model& model = resolved.loaded();
   const render::Camera& camera = bench.cameras[0];
   const int grid = views::grid_of(bench.cameras.size());
   const AttentionLayer layer = diffusion::find_layer(
       diffusion::self_attention_layers(model, grid * camera.width, grid * camera.height), options.layer);
 
-  const RenderedViews views = render_stage(bench, config, run, progress);
+  const RenderedViews views = render_stage(bench, config.render, run, progress);
   const PickedPoint point = pick_point(*bench.scene, views.set, options.point);
-  const PreparedDetail prepared = prepare_detail(bench, views, config, model, progress);
-  diffusion::EditOptions detail = config.detail;
-  detail.seed = config.seed;
+  const PreparedEdit prepared = prepare_edit(bench, views, config.edit, model, progress);
   ShownAttention shown;
-  shown.negative_prompt = diffusion::guidance_of(model, detail).negative_prompt;
-  shown.captured =
-      diffusion::capture_attention(model, prepared.inputs, detail, layer, options.evaluation, progress);
+  shown.negative_prompt = diffusion::guidance_of(model, config.edit.options).negative_prompt;
+  shown.captured = diffusion::capture_attention(model, prepared.inputs, config.edit.options, layer,
+                                                options.evaluation, progress);
   if (shown.captured.bias_level < 0)
-    throw Error(ErrorCode::kUsage, "--layer",
+    throw Error(ErrorCode::kUsage, "layer",
                 fmt::format("the bias does not act at the resolution of {}; choose a finer layer",
                             diffusion::short_name(layer)));
   const attention::KeyBuckets& buckets =
@@ -79,7 +78,7 @@ ShownAttention show_attention(const Config& config, const AttentionOptions& opti
 
 void check_attention_output(const fs::path& path) {
   if (path.extension() != ".html" && path.extension() != ".png")
-    throw Error(ErrorCode::kUsage, "--output",
+    throw Error(ErrorCode::kUsage, "output",
                 fmt::format("expected a name that ends in .html (a page) or .png (a picture), found '{}'",
                             printable(path.string())));
 }
@@ -93,11 +92,11 @@ void write_attention(const ShownAttention& shown, const Config& config, const fs
   }
   const diffusion::CapturedAttention& c = shown.captured;
   report::AttentionPage page;
-  page.title = config.asset.filename().string();
-  page.prompt = config.detail.prompt, page.negative_prompt = shown.negative_prompt;
+  page.title = config.inputs.asset.filename().string();
+  page.prompt = config.edit.options.prompt, page.negative_prompt = shown.negative_prompt;
   page.figure = shown.figure;
   page.beta = c.beta;
-  const bool scaled = config.detail.bias_scaling == diffusion::BiasScaling::kPaper;
+  const bool scaled = config.edit.options.bias_scaling == diffusion::BiasScaling::kPaper;
   page.facts = {fmt::format("layer <b>{}</b>", report::escaped(diffusion::short_name(c.layer))),
                 fmt::format("<b>{} × {}</b> latent pixels", c.layer.width, c.layer.height),
                 fmt::format("<b>{}</b> heads of <b>{}</b>", c.layer.num_heads, c.layer.head_dim),
@@ -105,7 +104,7 @@ void write_attention(const ShownAttention& shown, const Config& config, const fs
                             c.num_evaluations, c.timestep),
                 fmt::format("view <b>{}</b>, pixel <b>{:.0f}, {:.0f}</b>", shown.view + 1,
                             std::floor(shown.pixel.x), std::floor(shown.pixel.y)),
-                fmt::format("w = <b>{}</b>, β = {} = <b>{}</b>", config.detail.bias_weight,
+                fmt::format("w = <b>{}</b>, β = {} = <b>{}</b>", config.edit.options.bias_weight,
                             scaled ? "w/√d" : "w", report::number(c.beta))};
   report::write_attention_page(path, page);
 }

@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <string>
 
-#include "patina/base/progress.h"
 #include "patina/diffusion/attention_probe.h"
 #include "patina/pipeline/config.h"
 #include "patina/pipeline/pick_point.h"
 #include "patina/pipeline/run_folder.h"
+#include "patina/pipeline/run_progress.h"
 #include "patina/report/attention_page.h"
 
 namespace patina::pipeline {
@@ -30,8 +30,8 @@ struct ShownAttention {
 /// Renders the views into `run` (or takes those that are there), runs the model up to the evaluation, the
 /// bias acting as configured, and takes the row of the picked point. Throws Error{kUsage} where there is no
 /// such layer, view, pixel or evaluation, and where no bias acts in that layer.
-ShownAttention show_attention(const Config& config, const AttentionOptions& options, RunFolder& run,
-                              const Progress& progress);
+ShownAttention show_attention(Config config, const AttentionOptions& options, RunFolder& run,
+                              const RunProgress& progress);
 
 /// Writes it as a page (.html) or as one picture of three panels (.png).
 void write_attention(const ShownAttention& shown, const Config& config, const std::filesystem::path& path);

@@ -8,7 +8,7 @@
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
 #include "patina/inverse/fit.h"
-#include "patina/pipeline/options.h"
+#include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
 #include "patina/report/fit_preview.h"
 
@@ -55,41 +55,34 @@ WrittenMaps write_maps(const inverse::FitResult& fitted, const Workbench& bench,
 }
 
 std::string fit_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                    const Config& config) {
-  std::string key = values_read_by(config, kFitStage).dump() + bench.scene_hash +
-                    cameras_to_json(bench.cameras).dump() + fmt::format("{}", views.set.exposure_ev) +
-                    PATINA_VERSION;
-  for (const Image& image : edited)
-    key += hash_bytes(
-        {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
-  return hash_text(key);
+                    const FitSettings& settings) {
+  return StageKey(bench, settings).add_materials(bench).add(views.set.exposure_ev).add(edited).hash();
 }
 
 }  // namespace
 
 FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                          const Config& config, RunFolder& run, const Progress& progress) {
-  const std::string key = fit_key(bench, views, edited, config);
+                          const FitSettings& settings, RunFolder& run, const RunProgress& progress) {
+  const std::string key = fit_key(bench, views, edited, settings);
   run.run_stage("fit", key, progress, [&] {
-    inverse::FitOptions options = config.fit;
+    inverse::FitOptions options = settings.options;
     options.materials = bench.enhanced;
-    options.max_depth = config.max_depth;
-    options.seed = config.seed;
     inverse::FitHooks hooks;
     hooks.on_checkpoint = [&](const inverse::FitCheckpoint& c) {
       run.save_checkpoint("fit", key, c.next_iteration, c.bytes);
     };
     if (auto saved = run.load_checkpoint("fit", key))
       hooks.resume = inverse::FitCheckpoint{.next_iteration = saved->step, .bytes = std::move(saved->bytes)};
-    hooks.on_preview = [&](const inverse::FitPreview& preview) {
-      report::write_fit_preview(run.file(std::string(kPreviewFolder) + "/preview.html"),
-                                {.title = bench.asset.path.filename().string(),
-                                 .prompt = config.detail.prompt,
-                                 .negative_prompt = negative_prompt_of(run),
-                                 .edited = edited,
-                                 .rendered = preview.rendered,
-                                 .loss = preview.loss,
-                                 .iterations = options.iterations});
+    hooks.on_preview = [&, prompts = prompts_of(run)](const inverse::FitPreview& preview) {
+      const std::filesystem::path page = run.file(std::string(kPreviewFolder) + "/preview.html");
+      report::write_fit_preview(page, {.title = bench.asset.path.filename().string(),
+                                       .prompt = prompts.prompt,
+                                       .negative_prompt = prompts.negative_prompt,
+                                       .edited = edited,
+                                       .rendered = preview.rendered,
+                                       .loss = preview.loss,
+                                       .iterations = options.iterations});
+      progress.tell_preview(page);
     };
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
       (void)write_maps(so_far, bench, run, kPreviewFolder);
@@ -111,7 +104,7 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
       if (density.texels_per_pixel < kTooCoarse)
         progress.warn(fmt::format(
             "material '{}': its texture of {} x {} texels is coarser than the views by {:.1f} times, so fine "
-            "detail is lost; `--texture-size auto` makes it larger",
+            "detail is lost; the texture size 'auto' makes it larger",
             printable(name), density.width, density.height, 1 / density.texels_per_pixel));
     }
     result.metrics["loss"] = fitted.loss;
@@ -125,7 +118,7 @@ FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run) {
   const StageRecord* stage = run.stage("fit");
   if (!stage)
     throw Error(ErrorCode::kNotFound, run.path().string(),
-                "has no fitted textures yet; run `patina fit` on it first");
+                "has no fitted textures yet; `patina fit` makes them");
   FittedMaterials fitted{.maps = bench.maps, .changed = std::vector<asset::MapSet>(bench.maps.size())};
   for (const json& entry : stage->metrics.at("maps")) {
     const size_t m = entry.at("material");

@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include "patina/base/error.h"
-#include "patina/base/files.h"
 #include "patina/image/image_io.h"
-#include "patina/pipeline/options.h"
+#include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
 
 namespace patina::pipeline {
@@ -34,12 +33,13 @@ Image read_rgb_sized(const fs::path& path, int width, int height) {
 
 namespace {
 
-json coverage_metrics(const Workbench& bench, const Progress& progress, std::vector<std::string>& warnings) {
+json coverage_metrics(const Workbench& bench, const RunProgress& progress,
+                      std::vector<std::string>& warnings) {
   const float seen = views::seen_share(*bench.scene, bench.cameras);
   if (seen < 0.85f) {
     warnings.push_back(
-        fmt::format("The views see {:.0f} % of the surface. More views or several elevations (--views 16, "
-                    "--elevation -20 20 50) see more; what no view sees is treated as --unseen says.",
+        fmt::format("The views see {:.0f} % of the surface. More views (16) or several elevations (-20, 20 "
+                    "and 50) see more. Unseen surface is filled with the change around it, or kept.",
                     100 * seen));
     progress.warn(warnings.back());
   }
@@ -48,15 +48,14 @@ json coverage_metrics(const Workbench& bench, const Progress& progress, std::vec
 
 }  // namespace
 
-RenderedViews render_stage(const Workbench& bench, const Config& config, RunFolder& run,
-                           const Progress& progress) {
-  const std::string key = hash_text(values_read_by(config, kRenderStage).dump() + bench.scene_hash +
-                                    cameras_to_json(bench.cameras).dump() + PATINA_VERSION);
+RenderedViews render_stage(const Workbench& bench, const RenderSettings& settings, RunFolder& run,
+                           const RunProgress& progress) {
+  const std::string key = StageKey(bench, settings).hash();
   run.run_stage("render", key, progress, [&] {
-    const views::ViewOptions options{.path = {.samples_per_pixel = config.samples_per_pixel,
-                                              .max_depth = config.max_depth,
-                                              .seed = config.seed},
-                                     .exposure_ev = config.exposure_ev};
+    const views::ViewOptions options{.path = {.samples_per_pixel = settings.samples_per_pixel,
+                                              .max_depth = settings.max_depth,
+                                              .seed = settings.seed},
+                                     .exposure_ev = settings.exposure_ev};
     const views::ViewSet set = views::render_views(*bench.scene, bench.cameras, options, progress);
 
     RunFolder::StageResult result;
@@ -83,7 +82,7 @@ RenderedViews render_stage(const Workbench& bench, const Config& config, RunFold
 RenderedViews load_views(const Workbench& bench, const RunFolder& run) {
   if (!run.stage("render"))
     throw Error(ErrorCode::kNotFound, run.path().string(),
-                "has no rendered views yet; run `patina render` on it first");
+                "has no rendered views yet; `patina render` makes them");
   RenderedViews views;
   const json cameras = read_json(run.file("views/cameras.json"));
   views.set.grid = static_cast<int>(std::lround(std::sqrt(static_cast<double>(bench.cameras.size()))));

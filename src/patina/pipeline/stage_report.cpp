@@ -4,10 +4,9 @@
 #include <cmath>
 
 #include "patina/asset/map_slots.h"
-#include "patina/base/files.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/measures.h"
-#include "patina/pipeline/options.h"
+#include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
 #include "patina/report/report.h"
 
@@ -27,19 +26,12 @@ std::vector<Image> read_numbered(const RunFolder& run, std::string_view prefix,
 }
 
 std::string report_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                       const FittedMaterials& fitted, const Config& config) {
-  std::string key = values_read_by(config, kReportStage | kDetailStage).dump() + bench.scene_hash +
-                    PATINA_VERSION + cameras_to_json(bench.cameras).dump() +
-                    fmt::format("{}", views.set.exposure_ev);
-  const auto add = [&](const Image& image) {
-    key += hash_bytes(
-        {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
-  };
-  for (const Image& image : views.tile) add(image);
-  for (const Image& image : edited) add(image);
+                       const FittedMaterials& fitted, const ReportSettings& settings) {
+  StageKey key(bench, settings);
+  key.add_materials(bench).add(views.set.exposure_ev).add(views.tile).add(edited);
   for (const asset::MaterialMaps& m : fitted.maps)
-    for (const asset::MapSlotRow& row : asset::kMapSlots) add(slot_map(m, row.slot).texels);
-  return hash_text(key);
+    for (const asset::MapSlotRow& row : asset::kMapSlots) key.add(slot_map(m, row.slot).texels);
+  return key.hash();
 }
 
 std::vector<report::TexturePair> texture_pairs(const Workbench& bench, const FittedMaterials& fitted) {
@@ -75,55 +67,80 @@ json gather_metrics(const RunFolder& run, const json& measured) {
   return metrics;
 }
 
+// One turn at the height of the usual orbit, with the whole asset in view, whatever cameras the views had.
+void write_turntable(const Workbench& bench, const render::Scene& after, float exposure_ev,
+                     const ReportSettings& settings, const std::filesystem::path& path,
+                     const RunProgress& progress) {
+  constexpr int kMaxPixels = 320, kMaxSamples = 24;
+  const int resolution = std::min(bench.cameras[0].width, kMaxPixels);
+  const auto cameras =
+      views::orbit_cameras(asset::bounds(bench.asset), {.num_views = 1, .resolution = resolution});
+  report::write_turntable(path, *bench.scene, after, cameras,
+                          {.frames = settings.turntable_frames,
+                           .resolution = resolution,
+                           .samples_per_pixel = std::min(settings.samples_per_pixel, kMaxSamples),
+                           .max_depth = settings.max_depth,
+                           .seed = settings.seed,
+                           .exposure_ev = exposure_ev},
+                          progress);
+}
+
+// Renders the result and measures it.
+RunFolder::StageResult measure_result(const Workbench& bench, const RenderedViews& views,
+                                      std::span<const Image> edited, const FittedMaterials& fitted,
+                                      const ReportSettings& settings, const RunFolder& run,
+                                      const RunProgress& progress) {
+  RunFolder::StageResult result;
+  const render::Scene after(bench.asset, fitted.maps, bench.scene->environment(), bench.context.get(),
+                            {.bsdf_model = bench.scene->bsdf_model()});
+  const views::ViewOptions options{.path = {.samples_per_pixel = settings.samples_per_pixel,
+                                            .max_depth = settings.max_depth,
+                                            .seed = settings.seed},
+                                   .exposure_ev = views.set.exposure_ev};
+  const views::ViewSet rendered = views::render_views(after, bench.cameras, options, progress);
+  std::vector<Image> pictures;
+  for (size_t v = 0; v < rendered.views.size(); ++v) {
+    pictures.push_back(views::tile_control(rendered.views[v], views.set.exposure_ev));
+    result.outputs.push_back(numbered("report/rendered", v, ".png"));
+    write_image(run.file(result.outputs.back()), pictures.back());
+  }
+  const std::vector<Image> weights = measure_weights(bench, views, settings.boundary_pixels);
+  result.metrics["consistency"] = consistency_metrics(bench, views, edited);
+  result.metrics["fit"] = {
+      {"psnr", json_number(mean_over_views(pictures, edited, weights, report::psnr))},
+      {"sharpness", json_number(mean_over_views(pictures, edited, weights, report::sharpness_kept))},
+      {"psnr_before", json_number(mean_over_views(views.tile, edited, weights, report::psnr))}};
+  if (settings.turntable_frames > 0) {
+    result.outputs.push_back("turntable.webp");
+    write_turntable(bench, after, views.set.exposure_ev, settings, run.file(result.outputs.back()), progress);
+  }
+  return result;
+}
+
+// What the page says the run was asked for: config.json, as `patina` writes it.
+json asked_for(const RunFolder& run) {
+  const json config = read_json(run.file("config.json"));
+  json asked = config.value("options", json::object());
+  asked["asset"] = config.value("asset", "");
+  asked["version"] = config.value("patina", "");
+  return asked;
+}
+
 }  // namespace
 
 void report_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                  const FittedMaterials& fitted, const Config& config, RunFolder& run,
-                  const Progress& progress) {
-  const StageRecord& record =
-      run.run_stage("report", report_key(bench, views, edited, fitted, config), progress, [&] {
-        RunFolder::StageResult result;
-        const render::Scene after(bench.asset, fitted.maps, bench.scene->environment(), bench.context.get(),
-                                  {.bsdf_model = config.bsdf});
-        const views::ViewOptions options{.path = {.samples_per_pixel = config.samples_per_pixel,
-                                                  .max_depth = config.max_depth,
-                                                  .seed = config.seed},
-                                         .exposure_ev = views.set.exposure_ev};
-        const views::ViewSet rendered = views::render_views(after, bench.cameras, options, progress);
-        std::vector<Image> pictures;
-        for (size_t v = 0; v < rendered.views.size(); ++v) {
-          pictures.push_back(views::tile_control(rendered.views[v], views.set.exposure_ev));
-          result.outputs.push_back(numbered("report/rendered", v, ".png"));
-          write_image(run.file(result.outputs.back()), pictures.back());
-        }
-        const std::vector<Image> weights = measure_weights(bench, views, config);
-        result.metrics["consistency"] = consistency_metrics(bench, views, edited);
-        result.metrics["fit"] = {
-            {"psnr", json_number(mean_over_views(pictures, edited, weights, report::psnr))},
-            {"sharpness", json_number(mean_over_views(pictures, edited, weights, report::sharpness_kept))},
-            {"psnr_before", json_number(mean_over_views(views.tile, edited, weights, report::psnr))}};
-        if (config.turntable_frames > 0) {
-          views::OrbitOptions orbit = config.orbit;
-          orbit.num_views = config.turntable_frames;
-          orbit.elevations.resize(1);  // a turntable turns level
-          orbit.resolution = std::min(config.orbit.resolution, 320);
-          const auto cameras = views::orbit_cameras(asset::bounds(bench.asset), orbit);
-          report::write_turntable(run.file("turntable.webp"), *bench.scene, after, cameras,
-                                  {.frames = config.turntable_frames,
-                                   .resolution = orbit.resolution,
-                                   .samples_per_pixel = std::min(config.samples_per_pixel, 24),
-                                   .exposure_ev = views.set.exposure_ev},
-                                  progress);
-          result.outputs.push_back("turntable.webp");
-        }
-        return result;
-      });
+                  const FittedMaterials& fitted, const ReportSettings& settings, RunFolder& run,
+                  const RunProgress& progress) {
+  const std::string key = report_key(bench, views, edited, fitted, settings);
+  const StageRecord& record = run.run_stage("report", key, progress, [&] {
+    return measure_result(bench, views, edited, fitted, settings, run, progress);
+  });
 
   // The page is made anew every time: it is cheap, and tells of stages that ran again.
   report::ReportData page;
   page.title = bench.asset.path.filename().string();
-  page.prompt = config.detail.prompt;
-  page.negative_prompt = negative_prompt_of(run);
+  const Prompts prompts = prompts_of(run);
+  page.prompt = prompts.prompt, page.negative_prompt = prompts.negative_prompt;
   page.before = views.tile;
   page.edited.assign(edited.begin(), edited.end());
   page.after = read_numbered(run, "report/rendered", bench.cameras);
@@ -131,14 +148,12 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
   if (const StageRecord* fit = run.stage("fit"))
     for (const json& loss : fit->metrics.value("loss", json::array()))
       page.loss.push_back(loss.is_number() ? loss.get<float>() : NAN);
-  page.config = to_json(config);
-  page.config["asset"] = config.asset.string();
-  page.config["version"] = PATINA_VERSION;
+  page.config = asked_for(run);
   page.metrics = gather_metrics(run, record.metrics);
   page.warnings = bench.warnings;
   for (const StageRecord& stage : run.stages())
     page.warnings.insert(page.warnings.end(), stage.warnings.begin(), stage.warnings.end());
-  if (config.turntable_frames > 0) page.turntable = "turntable.webp";
+  if (settings.turntable_frames > 0) page.turntable = "turntable.webp";
   write_json(run.file("metrics.json"), page.metrics);
   report::write_report(run.file("report.html"), page);
 }

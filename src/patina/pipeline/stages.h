@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "patina/diffusion/edit.h"
-#include "patina/pipeline/config.h"
+#include "patina/pipeline/resolved_model.h"
 #include "patina/pipeline/run_folder.h"
+#include "patina/pipeline/settings.h"
 #include "patina/pipeline/workbench.h"
 
 namespace patina::pipeline {
@@ -24,24 +25,23 @@ struct RenderedViews {
 };
 
 /// Renders the views → views/tile_NN.png, views/normal_NN.png, views/radiance_NN.exr, views/cameras.json.
-RenderedViews render_stage(const Workbench& bench, const Config& config, RunFolder& run,
-                           const Progress& progress);
+RenderedViews render_stage(const Workbench& bench, const RenderSettings& settings, RunFolder& run,
+                           const RunProgress& progress);
 
-/// What the diffusion model is given beside the options: control images, noise and correspondences. Its seed
-/// is config.seed. Throws Error{kUsage} if the views do not fit the model.
-struct PreparedDetail {
+/// What the diffusion model is given beside the options: control images, noise and correspondences. Throws
+/// Error{kUsage} if the views do not fit the model.
+struct PreparedEdit {
   diffusion::EditInputs inputs;
   nlohmann::json noise_metrics;
   double noise_seconds = 0, correspond_seconds = 0;
 };
-PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views, const Config& config,
-                              const diffusion::Model& model, const Progress& progress);
+PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
+                          const diffusion::Model& model, const RunProgress& progress);
 
-/// Lets the diffusion model edit the views → detail/edited_NN.png. `shared_model`, if given, is loaded where
-/// it is empty and needed, and stays: runs of the same model then load it once.
-std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& views, const Config& config,
-                                RunFolder& run, const Progress& progress,
-                                std::optional<diffusion::Model>* shared_model = nullptr);
+/// Lets the diffusion model edit the views → detail/edited_NN.png. Loads the model where it is needed.
+std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views,
+                              const EditSettings& settings, ResolvedModel& model, RunFolder& run,
+                              const RunProgress& progress);
 
 /// Carries the edit into the textures → textures/NN_<material>_<slot>.png; meanwhile preview/preview.html.
 /// A fit that is stopped leaves its textures so far in preview/ and goes on from its checkpoint the next
@@ -51,12 +51,13 @@ struct FittedMaterials {
   std::vector<asset::MapSet> changed;
 };
 FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                          const Config& config, RunFolder& run, const Progress& progress);
+                          const FitSettings& settings, RunFolder& run, const RunProgress& progress);
 
-/// Measures the result and shows it → metrics.json, report.html, turntable.webp, report/rendered_NN.png.
+/// Measures the result and shows it → metrics.json, report.html, turntable.webp, report/rendered_NN.png. The
+/// page also shows what config.json of the run folder says.
 void report_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                  const FittedMaterials& fitted, const Config& config, RunFolder& run,
-                  const Progress& progress);
+                  const FittedMaterials& fitted, const ReportSettings& settings, RunFolder& run,
+                  const RunProgress& progress);
 
 /// What lies in the run folder from earlier, without running anything. Throw Error{kNotFound} that says which
 /// command makes it.
@@ -64,9 +65,11 @@ RenderedViews load_views(const Workbench& bench, const RunFolder& run);
 std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run);
 FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run);
 
-/// What the edited views of the run folder were guided away from, for those who look; empty where nothing
-/// was.
-std::string negative_prompt_of(const RunFolder& run);
+/// The words that the edited views of the run folder were made with; empty where there are none yet.
+struct Prompts {
+  std::string prompt, negative_prompt;
+};
+Prompts prompts_of(const RunFolder& run);
 
 /// A picture of a run folder as [height,width,3]; an alpha channel that a paint program added is dropped.
 /// Throws Error{kFormat} on another size.

@@ -71,9 +71,27 @@ std::string quoted_names(const std::vector<asset::Material>& materials) {
   return materials.size() > 10 ? list + ", ..." : list;
 }
 
+// Marks the used materials of that name. A name that no material has and that holds commas is a list of
+// names.
+void mark_named(const asset::Asset& asset, const std::vector<bool>& used, const std::string& name,
+                std::vector<bool>& wanted) {
+  bool found = false;
+  for (size_t m = 0; m < asset.materials.size(); ++m)
+    if (used[m] && asset.materials[m].name == name) wanted[m] = found = true;
+  if (found) return;
+  if (const size_t comma = name.find(','); comma != std::string::npos) {
+    mark_named(asset, used, name.substr(0, comma), wanted);
+    mark_named(asset, used, name.substr(comma + 1), wanted);
+    return;
+  }
+  throw Error(ErrorCode::kUsage, "material",
+              fmt::format("'{}' has no material named '{}'; it has {}", asset.path.string(), printable(name),
+                          quoted_names(asset.materials)));
+}
+
 // Which materials may change: those asked for, or all, that some triangle uses and that have UVs to carry
 // textures.
-std::vector<bool> choose_materials(const asset::Asset& asset, const Config& config,
+std::vector<bool> choose_materials(const asset::Asset& asset, const std::vector<std::string>& names,
                                    std::vector<std::string>& warnings) {
   const size_t num_materials = asset.materials.size();
   std::vector<bool> used(num_materials, false);
@@ -81,17 +99,9 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const Config& conf
     used[static_cast<size_t>(primitive.material)] = true;
 
   std::vector<bool> wanted = used;
-  if (!config.materials.empty()) {
+  if (!names.empty()) {
     wanted.assign(num_materials, false);
-    for (const std::string& name : config.materials) {
-      bool found = false;
-      for (size_t m = 0; m < num_materials; ++m)
-        if (used[m] && asset.materials[m].name == name) wanted[m] = found = true;
-      if (!found)
-        throw Error(ErrorCode::kUsage, "--material",
-                    fmt::format("'{}' has no material named '{}'; it has {}", asset.path.string(),
-                                printable(name), quoted_names(asset.materials)));
-    }
+    for (const std::string& name : names) mark_named(asset, used, name, wanted);
   }
 
   const std::vector<asset::UvState> states = asset::uv_states(asset);
@@ -101,7 +111,7 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const Config& conf
     const asset::UvState& uv = states[m];
     if (uv.missing || uv.zero_area > 0.99f) {
       const std::string fault = uv.missing ? "has no UVs" : "has UVs without any area";
-      if (!config.materials.empty())
+      if (!names.empty())
         throw Error(ErrorCode::kFormat, asset.path.string(),
                     fmt::format("material '{}' {}, so it cannot carry a texture; unwrap it first (Blender: "
                                 "U, Smart UV Project)",
@@ -136,40 +146,42 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const Config& conf
 
 }  // namespace
 
-Workbench open_workbench(const Config& config, const Progress& progress) {
+Workbench open_workbench(const InputSettings& inputs, const Progress& progress) {
   Workbench bench;
-  bench.asset = asset::read_asset(config.asset);
+  bench.asset = asset::read_asset(inputs.asset);
   asset::require_enhanceable(bench.asset);
   bench.warnings = bench.asset.warnings;
-  bench.enhanced = choose_materials(bench.asset, config, bench.warnings);
+  bench.enhanced = choose_materials(bench.asset, inputs.materials, bench.warnings);
   for (const std::string& warning : bench.warnings) progress.warn(warning);
   bench.maps = asset::resolve_materials(bench.asset);
 
   std::vector<asset::MaterialMaps> context_maps;
-  if (!config.scene.empty()) {
-    bench.context = std::make_unique<asset::Asset>(asset::read_asset(config.scene));
+  if (!inputs.scene.empty()) {
+    bench.context = std::make_unique<asset::Asset>(asset::read_asset(inputs.scene));
     context_maps = asset::resolve_materials(*bench.context);
   }
-  render::Environment environment = config.environment.empty() ? render::studio_environment()
-                                                               : render::read_environment(config.environment);
+  render::Environment environment = inputs.environment.empty() ? render::studio_environment()
+                                                               : render::read_environment(inputs.environment);
 
   Hasher hasher;
   add_asset(hasher, bench.asset, bench.maps);
   if (bench.context) add_asset(hasher, *bench.context, context_maps);
   hasher.add(environment.map().pixels);
-  bench.scene_hash = hasher.result();
 
-  if (!config.cameras.empty()) {
-    bench.cameras = cameras_from_json(read_json(config.cameras), config.cameras.string());
+  if (!inputs.cameras.empty()) {
+    bench.cameras = cameras_from_json(read_json(inputs.cameras), inputs.cameras.string());
   } else {
-    if (config.orbit.resolution % 8 != 0)
-      throw Error(ErrorCode::kUsage, "--resolution",
-                  fmt::format("expected a multiple of 8, found {}", config.orbit.resolution));
-    bench.cameras = views::orbit_cameras(bench.asset, config.orbit);
+    if (inputs.orbit.resolution % 8 != 0)
+      throw Error(ErrorCode::kUsage, "resolution",
+                  fmt::format("expected a multiple of 8, found {}", inputs.orbit.resolution));
+    bench.cameras = views::orbit_cameras(bench.asset, inputs.orbit);
   }
+  hasher.add(cameras_to_json(bench.cameras).dump());
+  hasher.add(fmt::format("{}", static_cast<int>(inputs.bsdf)));
+  bench.hash = hasher.result();
   bench.scene =
       std::make_unique<render::Scene>(bench.asset, bench.maps, std::move(environment), bench.context.get(),
-                                      render::Scene::Options{.bsdf_model = config.bsdf});
+                                      render::Scene::Options{.bsdf_model = inputs.bsdf});
   return bench;
 }
 

@@ -26,13 +26,13 @@ struct Workbench {
   std::unique_ptr<render::Scene> scene;   // with `maps`
   std::vector<render::Camera> cameras;
   std::vector<std::string> warnings;  // what will not come out well, for the report
-  std::string scene_hash;  // of geometry, materials, lights, environment: all that renders depend on
+  std::string hash;  // of all that renders depend on: geometry, materials, lights, environment, BSDF, cameras
 };
 
 /// Reads asset, context, environment and cameras and builds the scene. Throws Error for files that cannot be
 /// used, for an asset without usable UVs, and for material names that it does not have (listing those it
 /// has). Warns of what will not come out well.
-Workbench open_workbench(const Config& config, const Progress& progress);
+Workbench open_workbench(const InputSettings& inputs, const Progress& progress);
 
 /// Cameras as JSON: {"cameras": [{"world_from_camera": 16 numbers column by column, "fov_degrees", "width",
 /// "height"}], ...}.

@@ -10,6 +10,7 @@
 
 #include "patina/base/progress.h"
 #include "patina/image/image.h"
+#include "patina/render/path_tracer.h"
 #include "patina/render/scene.h"
 
 namespace patina::report {
@@ -54,6 +55,8 @@ struct TurntableOptions {
   int frames = 24;
   int resolution = 256;
   int samples_per_pixel = 16;
+  int max_depth = render::PathOptions{}.max_depth;
+  uint64_t seed = 0;
   float exposure_ev = 0;
   float seconds = 4;
 };

@@ -37,8 +37,8 @@ render::Camera orbited(const render::Camera& camera, const vec3& center, float a
 }
 
 Image frame(const render::Scene& scene, const render::Camera& camera, const TurntableOptions& options) {
-  render::PathOptions path;
-  path.samples_per_pixel = options.samples_per_pixel;
+  const render::PathOptions path{
+      .samples_per_pixel = options.samples_per_pixel, .max_depth = options.max_depth, .seed = options.seed};
   render::Render rendered = render::render(scene, camera, path);
   views::View view;
   view.camera = camera;

@@ -6,12 +6,11 @@
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
-#include "patina/base/files.h"
 #include "patina/base/memory.h"
 #include "patina/correspond/correspondences.h"
 #include "patina/correspond/noise.h"
 #include "patina/image/image_io.h"
-#include "patina/pipeline/options.h"
+#include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
 
 namespace patina::pipeline {
@@ -21,25 +20,9 @@ using nlohmann::json;
 
 namespace {
 
-// Weights are gigabytes: which file, how large, how old tells whether a model changed.
-std::string describe_files(const std::vector<fs::path>& files) {
-  std::string text;
-  for (const fs::path& file : files) {
-    std::error_code ignored;
-    text += fmt::format("{} {} {}\n", file.string(), fs::file_size(file, ignored),
-                        fs::last_write_time(file, ignored).time_since_epoch().count());
-  }
-  return text;
-}
-
-std::string detail_key(const Workbench& bench, const RenderedViews& views, const Config& config) {
-  std::string key = values_read_by(config, kDetailStage).dump() + bench.scene_hash +
-                    cameras_to_json(bench.cameras).dump() + PATINA_VERSION;
-  for (const std::vector<Image>* images : {&views.tile, &views.normal})
-    for (const Image& image : *images)
-      key += hash_bytes(
-          {reinterpret_cast<const uint8_t*>(image.pixels.data()), image.pixels.size() * sizeof(float)});
-  return hash_text(key + describe_files(diffusion::model_files(config.model)));
+std::string edit_key(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
+                     const ResolvedModel& model) {
+  return StageKey(bench, settings).add(views.tile).add(views.normal).add(model.hash()).hash();
 }
 
 // The view whose noise is farthest from white tells whether the noise can be trusted.
@@ -69,15 +52,15 @@ double megabytes(int64_t bytes) {
 }
 
 // Once a machine swaps, steps take minutes: better said before the first one. The weights are there by now.
-void warn_of_memory(const diffusion::EditMemory& memory, const Config& config, const Progress& progress) {
+void warn_of_memory(const diffusion::EditMemory& memory, const EditSettings& settings,
+                    const RunProgress& progress) {
   const int64_t available = available_bytes();
   if (available == 0 || memory.activations <= available) return;
   progress.warn(
       fmt::format("the networks will need about {:.1f} GB beside their weights, and {:.1f} GB are free: the "
-                  "machine may swap or "
-                  "end the run; take {}fewer or smaller views (--views, --resolution)",
+                  "machine may swap or end the run. Take fewer or smaller views{}.",
                   static_cast<double>(memory.activations) * 1e-9, static_cast<double>(available) * 1e-9,
-                  config.low_memory ? "" : "--low-memory, "));
+                  settings.low_memory ? "" : ", or low memory"));
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -86,19 +69,19 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
-PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views, const Config& config,
-                              const diffusion::Model& model, const Progress& progress) {
+PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
+                          const diffusion::Model& model, const RunProgress& progress) {
   const int scale = model.latent_scale();
   if (bench.cameras[0].width % scale || bench.cameras[0].height % scale)
-    throw Error(ErrorCode::kUsage, "--resolution", fmt::format("this model needs a multiple of {}", scale));
+    throw Error(ErrorCode::kUsage, "resolution", fmt::format("this model needs a multiple of {}", scale));
 
-  PreparedDetail prepared;
+  PreparedEdit prepared;
   auto start = std::chrono::steady_clock::now();
   std::vector<uint64_t> seeds;  // of fields of four channels
   for (int block = 0; 4 * block < model.latent_channels(); ++block)
-    seeds.push_back(correspond::block_seed(config.seed, block));
+    seeds.push_back(correspond::block_seed(settings.options.seed, block));
   const std::vector<correspond::NoiseField> noises =
-      correspond::make_noises(*bench.scene, bench.cameras, scale, {.mode = config.noise}, seeds, progress);
+      correspond::make_noises(*bench.scene, bench.cameras, scale, {.mode = settings.noise}, seeds, progress);
   prepared.noise_seconds = seconds_since(start);
   prepared.noise_metrics = noise_metrics(noises[0], views.set.grid);
   std::vector<float> noise;
@@ -111,7 +94,7 @@ PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views
                      .normal_views = views.normal,
                      .noise = std::move(noise),
                      .bias_levels = {}};
-  if (config.detail.bias_weight != 0) {
+  if (settings.options.bias_weight != 0) {
     start = std::chrono::steady_clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
     prepared.correspond_seconds = seconds_since(start);
@@ -119,34 +102,29 @@ PreparedDetail prepare_detail(const Workbench& bench, const RenderedViews& views
   return prepared;
 }
 
-std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& views, const Config& config,
-                                RunFolder& run, const Progress& progress,
-                                std::optional<diffusion::Model>* shared_model) {
-  const std::string key = detail_key(bench, views, config);
+std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views,
+                              const EditSettings& settings, ResolvedModel& resolved, RunFolder& run,
+                              const RunProgress& progress) {
+  const std::string key = edit_key(bench, views, settings, resolved);
   run.run_stage("detail", key, progress, [&] {
     const auto start = std::chrono::steady_clock::now();
     const int64_t bytes_before = resident_bytes();
-    std::optional<diffusion::Model> own_model;
-    std::optional<diffusion::Model>& model = shared_model ? *shared_model : own_model;
-    const bool loads = !model;  // else its weights are among the bytes before
-    if (loads)
-      model.emplace(config.model, diffusion::ModelOptions{config.dtype, config.num_threads, config.low_memory,
-                                                          config.device});
+    const bool loads = !resolved.is_loaded();  // else its weights are among the bytes before
+    const diffusion::Model& model = resolved.loaded();
     const double load_seconds = seconds_since(start);
-    const PreparedDetail prepared = prepare_detail(bench, views, config, *model, progress);
+    const PreparedEdit prepared = prepare_edit(bench, views, settings, model, progress);
 
-    diffusion::EditOptions options = config.detail;
-    options.seed = config.seed;
+    const diffusion::EditOptions& options = settings.options;
     const diffusion::EditMemory memory = diffusion::predict_memory(
-        *model, views.set.grid, bench.cameras[0].width, bench.cameras[0].height, options);
-    if (model->device() == diffusion::Device::kCpu) warn_of_memory(memory, config, progress);
+        model, views.set.grid, bench.cameras[0].width, bench.cameras[0].height, options);
+    if (model.device() == diffusion::Device::kCpu) warn_of_memory(memory, settings, progress);
     diffusion::EditHooks hooks;
     hooks.on_checkpoint = [&](const diffusion::Checkpoint& c) {
       run.save_checkpoint("detail", key, c.next_step, c.bytes);
     };
     if (auto saved = run.load_checkpoint("detail", key))
       hooks.resume = diffusion::Checkpoint{.next_step = saved->step, .bytes = std::move(saved->bytes)};
-    std::vector<Image> edited = diffusion::edit_views(*model, prepared.inputs, options, hooks, progress);
+    std::vector<Image> edited = diffusion::edit_views(model, prepared.inputs, options, hooks, progress);
 
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {
@@ -154,11 +132,12 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
     }
-    const diffusion::Guidance guidance = diffusion::guidance_of(*model, options);
-    const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model->latent_channels());
+    const diffusion::Guidance guidance = diffusion::guidance_of(model, options);
+    const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model.latent_channels());
     result.metrics = {
         {"noise", prepared.noise_metrics},
-        {"model", model->description()},
+        {"model", model.description()},
+        {"prompt", options.prompt},
         {"guidance", {{"scale", guidance.scale}, {"negative_prompt", guidance.negative_prompt}}},
         {"latent_pixels", latent_pixels},
         {"memory_mb",
@@ -176,7 +155,7 @@ std::vector<Image> detail_stage(const Workbench& bench, const RenderedViews& vie
 std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run) {
   if (!run.stage("detail"))
     throw Error(ErrorCode::kNotFound, run.path().string(),
-                "has no edited views yet; run `patina detail` on it first");
+                "has no edited views yet; `patina detail` makes them");
   std::vector<Image> edited;
   for (size_t v = 0; v < views.tile.size(); ++v)
     edited.push_back(read_rgb_sized(run.file(numbered("detail/edited", v, ".png")), views.tile[v].width,
@@ -184,10 +163,11 @@ std::vector<Image> load_edited(const RenderedViews& views, const RunFolder& run)
   return edited;
 }
 
-std::string negative_prompt_of(const RunFolder& run) {
-  const StageRecord* detail = run.stage("detail");
-  if (!detail) return {};
-  return detail->metrics.value("/guidance/negative_prompt"_json_pointer, std::string());
+Prompts prompts_of(const RunFolder& run) {
+  const StageRecord* edit = run.stage("detail");
+  if (!edit) return {};
+  return {edit->metrics.value("prompt", std::string()),
+          edit->metrics.value("/guidance/negative_prompt"_json_pointer, std::string())};
 }
 
 }  // namespace patina::pipeline

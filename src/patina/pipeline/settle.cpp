@@ -1,16 +1,14 @@
-#include "patina/pipeline/bundled_model.h"
-
+// What depends on the model: patina-mini where none is given, and the size of its training pictures.
 #include <nlohmann/json.hpp>
 
 #include "patina/base/files.h"
+#include "patina/pipeline/config.h"
 
 namespace patina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kName = "patina-mini";
-constexpr const char* kWeights = "unet/diffusion_pytorch_model.safetensors";
 constexpr int kUsualSampleSize = 64;  // latent pixels a side that Stable Diffusion 1.5 was trained at
 constexpr int kLatentScale = 8;       // image pixels a latent pixel
 
@@ -32,19 +30,12 @@ int native_resolution(const fs::path& model) {
 
 }  // namespace
 
-fs::path bundled_model() {
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  for (const fs::path& folder : {program.parent_path() / ".." / "share" / "patina" / "models" / kName,
-                                 fs::path(PATINA_SOURCE_DIR) / "models" / kName}) {
-    if (fs::exists(folder / kWeights, ignored)) return folder.lexically_normal();
-  }
-  return {};
-}
-
 void settle(Config& config) {
-  if (config.model.model.empty()) config.model.model = bundled_model();
-  if (config.orbit.resolution == 0) config.orbit.resolution = native_resolution(config.model.model);
+  fs::path& model = config.edit.model.model;
+  const bool is_bundled = model.empty() || (model == config.bundled_model.filename() && !fs::exists(model));
+  if (is_bundled && !config.bundled_model.empty()) model = config.bundled_model;
+  int& resolution = config.inputs.orbit.resolution;
+  if (resolution == 0) resolution = native_resolution(model);
 }
 
 }  // namespace patina::pipeline

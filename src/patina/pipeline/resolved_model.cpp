@@ -1,0 +1,73 @@
+#include "patina/pipeline/resolved_model.h"
+
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "patina/base/error.h"
+#include "patina/base/files.h"
+
+namespace patina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string hash_of_files(const std::vector<fs::path>& files) {
+  std::string text;
+  for (const fs::path& file : files) {
+    std::error_code ignored;
+    text += fmt::format("{} {} {}\n", file.string(), fs::file_size(file, ignored),
+                        fs::last_write_time(file, ignored).time_since_epoch().count());
+  }
+  return hash_text(text);
+}
+
+std::vector<fs::path> find_files(const EditSettings& settings) {
+  if (settings.model.model.empty())
+    throw Error(
+        ErrorCode::kUsage, "model",
+        "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
+        "2.x; `patina models DIR` lists those in a folder");
+  diffusion::check_device(settings.device, settings.dtype);
+  diffusion::check_model(settings.model);
+  return diffusion::model_files(settings.model);
+}
+
+}  // namespace
+
+struct ResolvedModel::State {
+  diffusion::ModelPaths paths;
+  diffusion::ModelOptions options;
+  std::string hash;
+  std::optional<diffusion::Model> model;
+};
+
+ResolvedModel::ResolvedModel(const EditSettings& settings)
+    : state_(new State{
+          .paths = settings.model,
+          .options = {.dtype = settings.dtype, .low_memory = settings.low_memory, .device = settings.device},
+          .hash = hash_of_files(find_files(settings)),
+          .model = std::nullopt}) {}
+
+ResolvedModel::~ResolvedModel() = default;
+ResolvedModel::ResolvedModel(ResolvedModel&&) noexcept = default;
+ResolvedModel& ResolvedModel::operator=(ResolvedModel&&) noexcept = default;
+
+const std::string& ResolvedModel::hash() const {
+  return state_->hash;
+}
+
+const diffusion::Model& ResolvedModel::loaded() {
+  if (!state_->model) state_->model.emplace(state_->paths, state_->options);
+  return *state_->model;
+}
+
+bool ResolvedModel::is_loaded() const {
+  return state_->model.has_value();
+}
+
+void ResolvedModel::unload() {
+  state_->model.reset();
+}
+
+}  // namespace patina::pipeline

@@ -1,0 +1,47 @@
+// What each stage of a run is told. A stage function receives its own struct and no other, and the key that
+// decides whether it runs again is the hash of that struct (stage_key.h): what a stage can read is in its
+// key.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "patina/correspond/noise.h"
+#include "patina/diffusion/options.h"
+#include "patina/inverse/fit_options.h"
+
+namespace patina::pipeline {
+
+struct RenderSettings {
+  int samples_per_pixel = 64;
+  int max_depth = 6;                 // bounces of the longest path
+  std::optional<float> exposure_ev;  // nullopt: automatic
+  uint64_t seed = 0;
+};
+
+struct EditSettings {
+  diffusion::ModelPaths model;
+  diffusion::Dtype dtype = diffusion::Dtype::kAuto;
+  diffusion::Device device = diffusion::Device::kAuto;
+  bool low_memory = false;
+  correspond::NoiseMode noise = correspond::NoiseMode::kExact;
+  diffusion::EditOptions options{.bias_weight = 1.8f};  // docs/decisions/0012; the initial noise has its seed
+};
+
+struct FitSettings {
+  inverse::FitOptions options = [] {
+    inverse::FitOptions usual;
+    usual.max_depth = RenderSettings{}.max_depth;  // the light of the fit is that of the renders
+    return usual;
+  }();
+};
+
+struct ReportSettings {
+  int turntable_frames = 24;  // 0: no turntable
+  int samples_per_pixel = RenderSettings{}.samples_per_pixel;
+  int max_depth = RenderSettings{}.max_depth;
+  int boundary_pixels = inverse::FitOptions{}.boundary_pixels;  // not measured beside silhouettes
+  uint64_t seed = 0;
+};
+
+}  // namespace patina::pipeline
