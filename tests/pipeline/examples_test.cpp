@@ -18,7 +18,7 @@ struct Example {
   std::string place, command;
 };
 
-// Lines of code blocks that call patina, without comments.
+// Lines of code blocks that call patina, without comments; a backslash at the end continues a line.
 std::vector<Example> examples_of(const fs::path& page) {
   static const std::regex call(R"(^(?:    )?(?:build/release/)?patina ([a-z].*)$)");
   std::vector<Example> examples;
@@ -26,6 +26,8 @@ std::vector<Example> examples_of(const fs::path& page) {
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
+    for (std::string rest; line.ends_with('\\') && std::getline(lines, rest); ++number)
+      line = line.substr(0, line.size() - 1) + rest;
     std::smatch match;
     if (!std::regex_match(line, match, call)) continue;
     std::string command = match[1];
