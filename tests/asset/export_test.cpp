@@ -333,7 +333,8 @@ TEST(ExportObj, changed_maps_come_back_from_obj_and_glb) {
   for (int i = 0; i < 16; ++i)
     maps[paint].normal.texels.set_rgb(i % 4, i / 4, glm::normalize(vec3(-0.2f, 0.1f, 1.0f)));
   auto changed = no_change(asset);
-  changed[paint] = {true, true, false, true};
+  for (const MapSlot slot : {MapSlot::kBaseColor, MapSlot::kRoughness, MapSlot::kNormal})
+    changed[paint].set(index_of(slot));
   for (const char* name : {"out/new.obj", "out/new.glb"}) {
     export_asset(asset, maps, changed, folder.path() / name);
     const Asset again = read_asset(folder.path() / name);
