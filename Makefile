@@ -8,6 +8,8 @@
 #   make bench-mini   how good the small model is: build/bench/mini.json and pictures (mini/docs/measuring-mini.md)
 
 JOBS ?= $(shell nproc)
+# Without it ccache does not keep what was compiled with a precompiled header.
+export CCACHE_SLOPPINESS ?= pch_defines,time_macros
 DEMO_DIR := build/demo
 DEMO_MODEL ?= models/patina-mini
 DEMO_PROMPT ?= a rusty old kettle

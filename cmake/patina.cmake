@@ -55,6 +55,15 @@ add_library(patina_torch INTERFACE)
 target_link_libraries(patina_torch INTERFACE ${TORCH_LIBRARIES})
 target_include_directories(patina_torch SYSTEM INTERFACE ${TORCH_INCLUDE_DIRS})
 
+include(torch_pch)
+
+# What can be done only when a folder's CMakeLists.txt has added all sources of a target.
+function(patina_finish_later target)
+  if(PATINA_PCH)
+    cmake_language(EVAL CODE "cmake_language(DEFER CALL patina_use_torch_pch [[${target}]])")
+  endif()
+endfunction()
+
 # patina_library(<folder> SOURCES <files> [DEPS <folders>] [PACKAGES <third-party targets>])
 # One static library a folder of src/patina; DEPS repeats the layering rule of docs/architecture.md.
 function(patina_library folder)
@@ -62,6 +71,7 @@ function(patina_library folder)
   add_library(patina_${folder} STATIC ${ARG_SOURCES})
   list(TRANSFORM ARG_DEPS PREPEND patina_)
   target_link_libraries(patina_${folder} PUBLIC patina_options ${ARG_DEPS} ${ARG_PACKAGES} Threads::Threads)
+  patina_finish_later(patina_${folder})
 endfunction()
 
 # patina_tool_library(<name> SOURCES <files> DEPS <folders> [PACKAGES <targets>]): what programs and tests outside src/patina
@@ -78,6 +88,7 @@ function(patina_program name)
   add_executable(${name} ${ARG_SOURCES})
   list(TRANSFORM ARG_DEPS PREPEND patina_)
   target_link_libraries(${name} PRIVATE patina_options ${ARG_DEPS} ${ARG_PACKAGES})
+  patina_finish_later(${name})
 endfunction()
 
 # patina_test(<folder> SOURCES <files> DEPS <folders> [PACKAGES <targets>]): one test program a folder, test_<folder>.
