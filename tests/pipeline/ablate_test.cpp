@@ -9,7 +9,7 @@
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/correspond/consistency.h"
-#include "patina/inverse/fit.h"
+#include "patina/inverse/loss.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/report/report.h"
 #include "process.h"
