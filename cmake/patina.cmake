@@ -29,6 +29,7 @@ find_package(Torch REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO) # its CMake package wants its command-line tools too
 pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebp libwebpmux)
+pkg_check_modules(UTF8PROC REQUIRED IMPORTED_TARGET libutf8proc)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 if(PATINA_BUILD_TESTS)
   find_package(GTest REQUIRED)

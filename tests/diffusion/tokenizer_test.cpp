@@ -96,5 +96,26 @@ TEST(Unicode, lowers_letters_of_all_scripts) {
               unicode::is_space(0x3000));
 }
 
+TEST(Unicode, letters_numbers_and_controls_are_the_general_categories_of_the_standard) {
+  for (const char32_t letter : {U'A', U'é', U'\u01c5' /* Lt */, U'\u02b0' /* Lm */, U'\u00aa' /* Lo */,
+                                U'\u77f3', U'\uac00', U'\U0001d49c'})
+    EXPECT_TRUE(unicode::is_letter(letter) && !unicode::is_number(letter)) << static_cast<uint32_t>(letter);
+  for (const char32_t number : {U'7', U'\u0663' /* Nd */, U'\u2167' /* Nl */, U'\u00b2' /* No */})
+    EXPECT_TRUE(unicode::is_number(number) && !unicode::is_letter(number)) << static_cast<uint32_t>(number);
+  for (const char32_t control : {U'\u0007', U'\u0085', U'\u200b' /* Cf */, U'\ufeff', U'\ue000' /* Co */})
+    EXPECT_TRUE(unicode::is_control(control)) << static_cast<uint32_t>(control);
+  // Marks, symbols, spaces and what is not assigned are none of these.
+  for (const char32_t other : {U'\u0301', U'+', U'\U0001F525', U' ', U'\u0378'})
+    EXPECT_FALSE(unicode::is_letter(other) || unicode::is_number(other) || unicode::is_control(other))
+        << static_cast<uint32_t>(other);
+}
+
+TEST(Unicode, composition_of_long_text_is_that_of_its_parts) {
+  std::u32string text, expected;
+  for (int i = 0; i < 1000; ++i) text += U"e\u0301 \uFFFD", expected += U"\u00e9 \uFFFD";
+  EXPECT_EQ(unicode::compose(text), expected);
+  EXPECT_EQ(unicode::compose(U""), U"");
+}
+
 }  // namespace
 }  // namespace patina::diffusion

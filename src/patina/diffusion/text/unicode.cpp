@@ -1,77 +1,20 @@
 #include "patina/diffusion/text/unicode.h"
 
-#include <algorithm>
 #include <cstdint>
-#include <map>
-#include <utility>
+#include <cstdlib>
+#include <memory>
 
-#include "patina/diffusion/text/unicode_tables.h"
+#include <utf8proc.h>
+
+#include "patina/base/check.h"
 
 namespace patina::diffusion::unicode {
 namespace {
 
 constexpr char32_t kReplacement = 0xFFFD;
 
-// Hangul syllables are composed by arithmetic [Unicode, Sec. 3.12].
-constexpr char32_t kSyllables = 0xAC00, kLeads = 0x1100, kVowels = 0x1161, kTails = 0x11A7;
-constexpr char32_t kNumLeads = 19, kNumVowels = 21, kNumTails = 28,
-                   kNumSyllables = kNumLeads * kNumVowels * kNumTails;
-
-/// The row whose [first, last] holds c, or null.
-template <class Table>
-const typename Table::value_type* find_range(const Table& table, char32_t c) {
-  const auto after = std::upper_bound(table.begin(), table.end(), c,
-                                      [](char32_t x, const auto& row) { return x < row.first; });
-  if (after == table.begin() || (after - 1)->last < c) return nullptr;
-  return &*(after - 1);
-}
-
-template <class Table>
-const Decomposition* find_decomposition(const Table& table, char32_t c) {
-  const auto row = std::lower_bound(table.begin(), table.end(), c,
-                                    [](const auto& r, char32_t x) { return r.character < x; });
-  return row != table.end() && row->character == c ? &*row : nullptr;
-}
-
-int combining_class(char32_t c) {
-  const CombiningRange* row = find_range(kCombining, c);
-  return row ? row->combining_class : 0;
-}
-
-void append_decomposed(std::u32string& out, char32_t c) {
-  if (c >= kSyllables && c < kSyllables + kNumSyllables) {
-    const char32_t index = c - kSyllables, tail = index % kNumTails;
-    out.push_back(kLeads + index / (kNumVowels * kNumTails));
-    out.push_back(kVowels + index / kNumTails % kNumVowels);
-    if (tail) out.push_back(kTails + tail);
-    return;
-  }
-  const Decomposition* row = find_decomposition(kComposing, c);
-  if (!row) row = find_decomposition(kDecomposing, c);
-  if (!row) {
-    out.push_back(c);
-    return;
-  }
-  append_decomposed(out, row->first);
-  if (row->second) append_decomposed(out, row->second);
-}
-
-/// The one character that a pair composes to, or 0.
-char32_t composed(char32_t a, char32_t b) {
-  if (a >= kLeads && a < kLeads + kNumLeads && b >= kVowels && b < kVowels + kNumVowels) {
-    return kSyllables + ((a - kLeads) * kNumVowels + (b - kVowels)) * kNumTails;
-  }
-  if (a >= kSyllables && a < kSyllables + kNumSyllables && (a - kSyllables) % kNumTails == 0 && b > kTails &&
-      b < kTails + kNumTails) {
-    return a + (b - kTails);
-  }
-  static const std::map<std::pair<char32_t, char32_t>, char32_t> pairs = [] {
-    std::map<std::pair<char32_t, char32_t>, char32_t> map;
-    for (const Decomposition& row : kComposing) map[{row.first, row.second}] = row.character;
-    return map;
-  }();
-  const auto found = pairs.find({a, b});
-  return found == pairs.end() ? 0 : found->second;
+utf8proc_category_t category(char32_t c) {
+  return utf8proc_category(static_cast<utf8proc_int32_t>(c));
 }
 
 }  // namespace
@@ -122,13 +65,38 @@ std::string to_utf8(std::u32string_view text) {
 }
 
 bool is_letter(char32_t c) {
-  return find_range(kLetters, c) != nullptr;
+  switch (category(c)) {
+    case UTF8PROC_CATEGORY_LU:
+    case UTF8PROC_CATEGORY_LL:
+    case UTF8PROC_CATEGORY_LT:
+    case UTF8PROC_CATEGORY_LM:
+    case UTF8PROC_CATEGORY_LO:
+      return true;
+    default:
+      return false;
+  }
 }
+
 bool is_number(char32_t c) {
-  return find_range(kNumbers, c) != nullptr;
+  switch (category(c)) {
+    case UTF8PROC_CATEGORY_ND:
+    case UTF8PROC_CATEGORY_NL:
+    case UTF8PROC_CATEGORY_NO:
+      return true;
+    default:
+      return false;
+  }
 }
+
 bool is_control(char32_t c) {
-  return find_range(kControls, c) != nullptr;
+  switch (category(c)) {
+    case UTF8PROC_CATEGORY_CC:
+    case UTF8PROC_CATEGORY_CF:
+    case UTF8PROC_CATEGORY_CO:
+      return true;
+    default:
+      return false;
+  }
 }
 
 bool is_space(char32_t c) {
@@ -138,53 +106,27 @@ bool is_space(char32_t c) {
 }
 
 std::u32string lower(std::u32string_view text) {
+  // The one character whose lower case is two.
   constexpr char32_t kDottedI = 0x130, kDotAbove = 0x307;
   std::u32string out;
   for (const char32_t c : text) {
-    const LowerRun* run = find_range(kLower, c);
-    if (c == kDottedI) {
+    if (c == kDottedI)
       out += {U'i', kDotAbove};
-    } else if (run && (c - run->first) % static_cast<char32_t>(run->stride) == 0) {
-      out.push_back(static_cast<char32_t>(static_cast<int32_t>(c) + run->delta));
-    } else {
-      out.push_back(c);
-    }
+    else
+      out.push_back(static_cast<char32_t>(utf8proc_tolower(static_cast<utf8proc_int32_t>(c))));
   }
   return out;
 }
 
 std::u32string compose(std::u32string_view text) {
-  std::u32string decomposed;
-  for (const char32_t c : text) append_decomposed(decomposed, c);
-
-  // Marks after a base are put into the order of their classes.
-  for (size_t begin = 0; begin < decomposed.size();) {
-    size_t end = begin;
-    while (end < decomposed.size() && combining_class(decomposed[end]) != 0) ++end;
-    std::stable_sort(decomposed.begin() + static_cast<std::ptrdiff_t>(begin),
-                     decomposed.begin() + static_cast<std::ptrdiff_t>(end),
-                     [](char32_t a, char32_t b) { return combining_class(a) < combining_class(b); });
-    begin = end + 1;
-  }
-
-  // A character joins the last starter unless one of the same or a higher class stands between.
-  std::u32string out;
-  size_t starter = std::u32string::npos;
-  int last_class = 0;
-  for (const char32_t c : decomposed) {
-    const int this_class = combining_class(c);
-    if (starter != std::u32string::npos &&
-        (starter + 1 == out.size() || (last_class < this_class && last_class != 0))) {
-      if (const char32_t joined = composed(out[starter], c)) {
-        out[starter] = joined;
-        continue;
-      }
-    }
-    if (this_class == 0) starter = out.size();
-    last_class = this_class;
-    out.push_back(c);
-  }
-  return out;
+  const std::string bytes = to_utf8(text);
+  utf8proc_uint8_t* composed = nullptr;
+  const utf8proc_ssize_t length = utf8proc_map(
+      reinterpret_cast<const utf8proc_uint8_t*>(bytes.data()), static_cast<utf8proc_ssize_t>(bytes.size()),
+      &composed, static_cast<utf8proc_option_t>(UTF8PROC_STABLE | UTF8PROC_COMPOSE));
+  const std::unique_ptr<utf8proc_uint8_t, decltype(&std::free)> owner(composed, &std::free);
+  PATINA_CHECK(length >= 0);  // to_utf8 gives no malformed text
+  return from_utf8({reinterpret_cast<const char*>(composed), static_cast<size_t>(length)});
 }
 
 }  // namespace patina::diffusion::unicode

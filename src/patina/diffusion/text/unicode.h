@@ -1,5 +1,5 @@
 // The little of Unicode that a tokenizer needs: UTF-8, character classes, lower case, canonical composition
-// (NFC).
+// (NFC). The properties of characters come from utf8proc.
 #pragma once
 
 #include <string>
