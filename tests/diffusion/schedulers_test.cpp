@@ -310,7 +310,7 @@ TEST(Schedulers, choosing_another_scheduler_keeps_the_model_and_takes_the_defaul
 TEST(Schedulers, configurations_that_change_the_arithmetic_are_refused_by_name) {
   const auto message = [](const char* json) -> std::string {
     try {
-      parse_scheduler_config(json, "scheduler_config.json");
+      make_schedule(parse_scheduler_config(json, "scheduler_config.json"), 20);
     } catch (const Error& error) {
       return error.what();
     }
@@ -324,6 +324,21 @@ TEST(Schedulers, configurations_that_change_the_arithmetic_are_refused_by_name) 
             std::string::npos);
   EXPECT_NE(message(R"({"num_train_timesteps":-1})").find("num_train_timesteps"), std::string::npos);
   EXPECT_NE(message("[1, 2").find("JSON"), std::string::npos);
+}
+
+// As published for models that were trained to predict v.
+TEST(Schedulers, settings_of_the_models_own_solver_do_not_stop_another) {
+  const SchedulerConfig model = parse_scheduler_config(
+      R"({"_class_name":"DPMSolverMultistepScheduler","beta_start":0.00085,"beta_end":0.012,
+          "beta_schedule":"scaled_linear","prediction_type":"v_prediction","timestep_spacing":"trailing",
+          "rescale_betas_zero_snr":true,"solver_order":3,"algorithm_type":"dpmsolver"})",
+      "scheduler_config.json");
+  const SchedulerConfig chosen = choose_scheduler(model, Scheduler::kDdim);
+  EXPECT_EQ(make_schedule(chosen, 20).timesteps.front(), 999);
+  EXPECT_EQ(chosen.prediction, Prediction::kV);
+  EXPECT_TRUE(chosen.zero_terminal_snr);
+  EXPECT_EQ(chosen.solver_order, 2);
+  EXPECT_THROW(make_schedule(choose_scheduler(model, Scheduler::kDpmSolverPp2m), 20), Error);
 }
 
 TEST(Schedulers, a_class_that_patina_lacks_lends_its_noise_schedule_to_unipc) {

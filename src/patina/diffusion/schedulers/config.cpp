@@ -1,5 +1,6 @@
 // scheduler_config.json -> SchedulerConfig. Absent keys get the default of the class that diffusers
-// registers; settings that would change the arithmetic in a way patina does not have are refused by name.
+// registers; settings that would change the arithmetic in a way patina does not have are refused by name,
+// those of the file's own solver only when that solver runs.
 #include <optional>
 #include <string>
 #include <utility>
@@ -98,6 +99,25 @@ std::optional<Solver> named_solver(const Json& object) {
   return std::nullopt;
 }
 
+Solver solver_of(Scheduler choice) {
+  switch (choice) {
+    case Scheduler::kDdim:
+      return Solver::kDdim;
+    case Scheduler::kPndm:
+      return Solver::kPndm;
+    case Scheduler::kEuler:
+      return Solver::kEuler;
+    case Scheduler::kEulerAncestral:
+      return Solver::kEulerAncestral;
+    case Scheduler::kDpmSolverPp2m:
+    case Scheduler::kDpmSolverPp2mKarras:
+      return Solver::kDpmSolverPp;
+    case Scheduler::kUniPc:
+      break;
+  }
+  return Solver::kUniPc;
+}
+
 void refuse_unsupported(const Reader& reader, const SchedulerConfig& config) {
   reader.refuse_if(reader.boolean("thresholding", false), "thresholding");
   reader.refuse_if(reader.boolean("use_lu_lambdas", false), "use_lu_lambdas");
@@ -116,17 +136,8 @@ void refuse_unsupported(const Reader& reader, const SchedulerConfig& config) {
   reader.refuse_if(reader.has("variance_type") && config.solver == Solver::kDpmSolverPp, "variance_type");
 }
 
-}  // namespace
-
-SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view context) {
-  const Json object = Json::parse(json, nullptr, /*allow_exceptions=*/false);
-  if (!object.is_object())
-    throw Error(ErrorCode::kFormat, context, "is not a JSON object; expected a scheduler configuration");
-  const Reader reader(object, std::string(context));
-
-  SchedulerConfig config;
-  const std::optional<Solver> named = named_solver(object);
-  config.solver = named.value_or(Solver::kUniPc);
+/// The noise schedule, the prediction and what else every solver takes from the model.
+void read_schedule(SchedulerConfig& config, const Reader& reader) {
   const bool ddim = config.solver == Solver::kDdim;
   config.num_train_timesteps = reader.integer("num_train_timesteps", 1000, 2, 1'000'000);
   config.beta_start = reader.number("beta_start", 1e-4, 1e-12, 0.999);
@@ -152,45 +163,51 @@ SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view c
   config.use_karras_sigmas = reader.boolean("use_karras_sigmas", false);
   config.final_sigma = reader.choice("final_sigmas_type", FinalSigma::kZero,
                                      {{"zero", FinalSigma::kZero}, {"sigma_min", FinalSigma::kSigmaMin}});
-  if (named) config.solver_order = reader.integer("solver_order", 2, 1, 2);
-  config.skip_prk_steps = reader.boolean("skip_prk_steps", named != Solver::kPndm);
-  config.lower_order_final = reader.boolean("lower_order_final", true);
-  if (named == Solver::kDpmSolverPp) {
+}
+
+/// What only the class named in the file makes use of. Throws Error for a setting that patina lacks.
+void read_own_settings(SchedulerConfig& config, const Reader& reader) {
+  config.solver_order = reader.integer("solver_order", 2, 1, 2);
+  if (config.solver == Solver::kDpmSolverPp) {
     config.dpm_sde =
         reader.choice("algorithm_type", false, {{"dpmsolver++", false}, {"sde-dpmsolver++", true}});
     config.dpm_variant = reader.choice("solver_type", DpmVariant::kMidpoint,
                                        {{"midpoint", DpmVariant::kMidpoint}, {"heun", DpmVariant::kHeun}});
   }
-  if (named == Solver::kUniPc)
+  if (config.solver == Solver::kUniPc)
     config.unipc_variant = reader.choice("solver_type", UniPcVariant::kBh2,
                                          {{"bh1", UniPcVariant::kBh1}, {"bh2", UniPcVariant::kBh2}});
   refuse_unsupported(reader, config);
+}
+
+}  // namespace
+
+SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view context) {
+  const Json object = Json::parse(json, nullptr, /*allow_exceptions=*/false);
+  if (!object.is_object())
+    throw Error(ErrorCode::kFormat, context, "is not a JSON object; expected a scheduler configuration");
+  const Reader reader(object, std::string(context));
+
+  SchedulerConfig config;
+  const std::optional<Solver> named = named_solver(object);
+  config.solver = named.value_or(Solver::kUniPc);
+  read_schedule(config, reader);
+  config.skip_prk_steps = reader.boolean("skip_prk_steps", named != Solver::kPndm);
+  config.lower_order_final = reader.boolean("lower_order_final", true);
+  if (named) {
+    try {
+      read_own_settings(config, reader);
+    } catch (const Error& error) {
+      config.refusal = error;
+    }
+  }
   return config;
 }
 
 SchedulerConfig choose_scheduler(const SchedulerConfig& model, Scheduler choice) {
   SchedulerConfig config = model;
-  switch (choice) {
-    case Scheduler::kDdim:
-      config.solver = Solver::kDdim;
-      break;
-    case Scheduler::kPndm:
-      config.solver = Solver::kPndm;
-      break;
-    case Scheduler::kEuler:
-      config.solver = Solver::kEuler;
-      break;
-    case Scheduler::kEulerAncestral:
-      config.solver = Solver::kEulerAncestral;
-      break;
-    case Scheduler::kDpmSolverPp2m:
-    case Scheduler::kDpmSolverPp2mKarras:
-      config.solver = Solver::kDpmSolverPp;
-      break;
-    case Scheduler::kUniPc:
-      config.solver = Solver::kUniPc;
-      break;
-  }
+  config.solver = solver_of(choice);
+  if (config.solver != model.solver) config.refusal.reset();  // of settings that are not used then
   if (choice == Scheduler::kDpmSolverPp2m || choice == Scheduler::kDpmSolverPp2mKarras)
     config.use_karras_sigmas = choice == Scheduler::kDpmSolverPp2mKarras;
   return config;

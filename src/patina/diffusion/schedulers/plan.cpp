@@ -196,6 +196,7 @@ void check(const SchedulerConfig& config, int num_steps) {
 }  // namespace
 
 SchedulePlan make_schedule(const SchedulerConfig& config, int num_steps) {
+  if (config.refusal) throw *config.refusal;
   check(config, num_steps);
   SchedulePlan plan;
   plan.config = config;

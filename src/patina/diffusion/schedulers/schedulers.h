@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "patina/base/error.h"
 #include "patina/diffusion/options.h"
 
 namespace patina::diffusion {
@@ -49,12 +50,13 @@ struct SchedulerConfig {
   DpmVariant dpm_variant = DpmVariant::kMidpoint;
   bool dpm_sde = false;  // DPM-Solver++ as a stochastic equation: draws noise each step
   UniPcVariant unipc_variant = UniPcVariant::kBh2;
+  std::optional<Error> refusal;  // of a setting of `solver` that patina lacks; make_schedule throws it
 };
 
 /// Reads the text of a scheduler_config.json; `context` (its path) goes into errors. Keys that are absent get
 /// diffusers' default of the class; a class that patina lacks is read for its noise schedule and gets UniPC.
 /// Throws Error{kFormat} for values of the wrong type or range, Error{kUnsupported} naming a setting patina
-/// lacks.
+/// lacks; such a fault in a setting of the class itself becomes the configuration's `refusal`.
 SchedulerConfig parse_scheduler_config(std::string_view json, std::string_view context);
 
 /// The model's configuration (betas, prediction, offsets) under the scheduler the user chose, with that
@@ -74,7 +76,8 @@ struct SchedulePlan {
   int num_calls() const { return static_cast<int>(timesteps.size()); }
 };
 
-/// Throws Error{kUsage} unless 1 <= num_steps < num_train_timesteps and the settings fit together.
+/// Throws the configuration's refusal if it has one, Error{kUsage} unless 1 <= num_steps <
+/// num_train_timesteps and the settings fit together.
 SchedulePlan make_schedule(const SchedulerConfig& config, int num_steps);
 
 /// Index of the first timestep of image-to-image at `strength` in (0,1]: the last int(num_steps · strength)
