@@ -111,7 +111,7 @@ nlohmann::json measure(const std::vector<attention::KeyBuckets>& levels, int ste
   const diffusion::Denoiser denoiser{
       &unet,
       {{&tile, tile.use()->hint(hint_image), 1}, {&normal, normal.use()->hint(hint_image), 1}},
-      at::randn({2, 77, configs.text_encoder.hidden_size}),
+      {at::randn({2, 77, configs.text_encoder.hidden_size}), {}},
       kGuidanceScale,
       diffusion::guides_in_one_batch(unet.config(), width * width),
       &bias};

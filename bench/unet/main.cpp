@@ -88,8 +88,9 @@ nlohmann::json measure(const Options& options) {
                    text = at::randn({1, 77, 768});
   const std::string size = std::to_string(options.side * options.grid);
   FlopCount count(unet_weights);
-  unet({sample, time, text}, count.recorder());
-  const auto evaluate = [&] { unet({sample, time, text}); };
+  const diffusion::NetworkInputs inputs{sample, time, {text, {}}};
+  unet(inputs, {}, count.recorder());
+  const auto evaluate = [&] { unet(inputs); };
   const double seconds = best_seconds(options.repeat, evaluate);
   result["unet_" + size + "_seconds"] = seconds;
   result["unet_gflop"] = count.flops() * 1e-9;
@@ -119,9 +120,7 @@ nlohmann::json measure(const Options& options) {
     nn::WeightReader plain_unet_reader(unet_weights, plain), plain_vae_reader(vae_weights, plain);
     const diffusion::UNet plain_unet(configs.unet, plain_unet_reader);
     const diffusion::Vae plain_vae(configs.vae, plain_vae_reader);
-    result["unet_" + size + "_plain_seconds"] = best_seconds(options.repeat, [&] {
-      plain_unet({sample, time, text});
-    });
+    result["unet_" + size + "_plain_seconds"] = best_seconds(options.repeat, [&] { plain_unet(inputs); });
     result["vae_decode_" + std::to_string(options.side) + "_plain_seconds"] =
         best_seconds(std::max(1, options.repeat / 2), [&] { plain_vae.decode(view); });
     result["convolutions"] = bench::measure_convolutions(options.repeat);
@@ -130,7 +129,7 @@ nlohmann::json measure(const Options& options) {
   // Guidance evaluates two prompts: as one batch?
   const at::Tensor two_samples = sample.expand({2, -1, -1, -1}), two_texts = text.expand({2, -1, -1});
   result["unet_" + size + "_batch_of_two_seconds"] = best_seconds(std::max(1, options.repeat / 2), [&] {
-    unet({two_samples, time, two_texts});
+    unet({two_samples, time, {two_texts, {}}});
   });
   return result;
 }

@@ -87,13 +87,12 @@ at::Tensor velocity_error(const Networks& networks, const DenoiserBatch& batch, 
   const at::Tensor noisy = signal * batch.latents + spread * noise;
   const at::Tensor velocity = signal * noise - spread * batch.latents;
 
-  const at::Tensor text = networks.text(batch.ids).last_hidden_state;
-  const at::Tensor times = timesteps.to(at::kFloat);
+  const NetworkInputs inputs{noisy, timesteps.to(at::kFloat), networks.text(batch.ids)};
   const ControlResiduals tile =
-      scaled(networks.tile(noisy, times, text, networks.tile.hint(batch.tile), 1.0f), tile_scale);
+      scaled(networks.tile(inputs, networks.tile.hint(batch.tile), 1.0f), tile_scale);
   const ControlResiduals normal =
-      scaled(networks.normal(noisy, times, text, networks.normal.hint(batch.normal), 1.0f), normal_scale);
-  const at::Tensor predicted = networks.unet({noisy, times, text, sum(tile, normal)}).to(at::kFloat);
+      scaled(networks.normal(inputs, networks.normal.hint(batch.normal), 1.0f), normal_scale);
+  const at::Tensor predicted = networks.unet(inputs, sum(tile, normal)).to(at::kFloat);
   return (predicted - velocity).square().mean({1, 2, 3});
 }
 

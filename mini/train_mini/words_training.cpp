@@ -84,7 +84,7 @@ void train_words(const fs::path& work, const fs::path& model, const RunOptions& 
   const auto foretold = [&](const std::vector<int64_t>& ids, int64_t count) {
     nn::WeightReader weights(text, at::kFloat);
     const diffusion::TextEncoder encoder(config, weights);
-    const at::Tensor hidden = encoder(at::tensor(ids, at::kLong).view({count, -1})).last_hidden_state.mean(1);
+    const at::Tensor hidden = encoder(at::tensor(ids, at::kLong).view({count, -1})).tokens.mean(1);
     const int64_t outputs = kLooks + num_classes;
     return at::linear(hidden, readout.find("map.weight", {outputs, config.hidden_size}, at::kFloat),
                       readout.find("map.bias", {outputs}, at::kFloat));

@@ -2,6 +2,8 @@
 // U-Net predicts, asked of it.
 #include "patina/diffusion/text/text_conditioning.h"
 
+#include <array>
+
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 
@@ -17,7 +19,7 @@ class Conditioning : public testing::Test {
  protected:
   at::Tensor encode(const std::vector<std::string>& prompts, const LearnedWords& words = {},
                     int64_t skip = 1) {
-    return encode_prompts(tokenizer(), encoder(), words, prompts, skip);
+    return encode_prompts(tokenizer(), encoder(), words, prompts, skip).tokens;
   }
   static const Tokenizer& tokenizer() {
     static const Tokenizer tokenizer(test::data_dir() / "tiny-sd" / "tokenizer");
@@ -34,8 +36,8 @@ TEST_F(Conditioning, a_plain_prompt_is_the_text_encoders_own_output_to_the_bit) 
   for (const char* prompt : {"", "a rusty old kettle", "\\(old\\)"}) {
     const std::string text = std::string(prompt) == "\\(old\\)" ? "(old)" : prompt;
     const at::Tensor ids = at::tensor(tokenizer().encode_padded(text, 77), at::kLong).unsqueeze(0);
-    EXPECT_TRUE(at::equal(encode({prompt}), encoder()(ids).last_hidden_state));
-    EXPECT_TRUE(at::equal(encode({prompt}, {}, 2), encoder()(ids, 2).last_hidden_state));
+    EXPECT_TRUE(at::equal(encode({prompt}), encoder()(ids).tokens));
+    EXPECT_TRUE(at::equal(encode({prompt}, {}, 2), encoder()(ids, 2).tokens));
   }
 }
 
@@ -59,6 +61,33 @@ TEST_F(Conditioning, both_prompts_get_as_many_chunks_as_the_longer_needs) {
   EXPECT_TRUE(at::equal(both.slice(0, 0, 1).slice(1, 0, 77), encode({"clean"})));
   EXPECT_TRUE(at::equal(both.slice(0, 0, 1).slice(1, 77, 154), encode({""})));
   EXPECT_FALSE(at::equal(both.slice(0, 1, 2).slice(1, 0, 77), both.slice(0, 1, 2).slice(1, 77, 154)));
+}
+
+TEST_F(Conditioning, pooled_is_the_text_encoders_own_of_the_first_chunk) {
+  const std::vector<std::string> prompts{"a rusty old kettle", "(clean:1.3)"};
+  const TextConditioning both = encode_prompts(tokenizer(), encoder(), {}, prompts);
+  ASSERT_EQ(both.pooled.sizes(), at::IntArrayRef({2, 64}));
+  const std::vector<std::string> plain{"a rusty old kettle", "clean"};
+  for (int64_t i = 0; i < 2; ++i) {
+    const std::vector<int64_t> ids = tokenizer().encode_padded(plain[static_cast<size_t>(i)], 77);
+    EXPECT_TRUE(at::equal(both.pooled[i], encoder()(at::tensor(ids, at::kLong).unsqueeze(0)).pooled[0]));
+  }
+}
+
+TEST_F(Conditioning, prompts_are_stacked_and_split_and_encoders_joined_without_loss) {
+  const std::vector<std::string> first{"clean"}, second{"rusty"}, both{"clean", "rusty"};
+  const TextConditioning a = encode_prompts(tokenizer(), encoder(), {}, first),
+                         b = encode_prompts(tokenizer(), encoder(), {}, second);
+  const TextConditioning stacked = stack_prompts(std::array{a, b});
+  EXPECT_TRUE(at::equal(stacked.tokens, encode_prompts(tokenizer(), encoder(), {}, both).tokens));
+  const std::vector<TextConditioning> split = split_prompts(stacked, 1);
+  ASSERT_EQ(split.size(), 2u);
+  EXPECT_TRUE(at::equal(split[1].tokens, b.tokens));
+  EXPECT_TRUE(at::equal(split[1].pooled, b.pooled));
+  const TextConditioning joined = join_encoders(std::array{a, b});
+  EXPECT_EQ(joined.tokens.size(2), 2 * a.tokens.size(2));
+  EXPECT_TRUE(at::equal(joined.tokens.slice(2, a.tokens.size(2)), b.tokens));
+  EXPECT_TRUE(at::equal(joined.pooled, b.pooled));
 }
 
 TEST_F(Conditioning, a_learned_copy_of_a_token_is_that_token) {

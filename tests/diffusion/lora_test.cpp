@@ -7,6 +7,7 @@
 #include "../support.h"
 #include "make_checkpoint/checkpoint.h"
 #include "patina/base/error.h"
+#include "patina/diffusion/files/embedding.h"
 #include "patina/diffusion/networks/component.h"
 
 namespace patina::diffusion {
@@ -27,8 +28,9 @@ class Lora : public testing::Test {
   fs::path path(const std::string& name) const { return folder_.path() / (name + ".safetensors"); }
   LoraSet match(const std::string& name, float weight = 1) const {
     const std::vector<LoraChoice> choices{{path(name), weight}};
-    return match_loras(choices, unet_, text_);
+    return match_loras(choices, unet_, texts());
   }
+  std::vector<const TensorTable*> texts() const { return {&text_.table}; }
   std::string refusal(const std::string& name) const {
     try {
       match(name);
@@ -84,8 +86,9 @@ TEST_F(Lora, is_merged_as_by_hand_in_f64) {
     EXPECT_GT((found - weight).abs().max().item<double>(), 1e-3);
   }
   const std::string projection = "text_model.encoder.layers.1.self_attn.v_proj.weight";
-  EXPECT_TRUE(set.text_encoder.contains(projection));
-  EXPECT_FALSE(at::equal(merged(text_.table, set.text_encoder, projection), plain(text_.table, projection)));
+  EXPECT_TRUE(set.text_encoders[0].contains(projection));
+  EXPECT_FALSE(
+      at::equal(merged(text_.table, set.text_encoders[0], projection), plain(text_.table, projection)));
 }
 
 TEST_F(Lora, is_the_same_in_every_naming) {
@@ -98,7 +101,7 @@ TEST_F(Lora, is_the_same_in_every_naming) {
       make::write_lora(path("same"), model_, {.naming = naming, .rank = 4, .text_encoder = false});
     } else {
       make::write_lora(path("same"), model_, {.naming = naming, .rank = 4, .alpha = 4});
-      EXPECT_EQ(match("same").text_encoder.size(), expected.text_encoder.size());
+      EXPECT_EQ(match("same").text_encoders[0].size(), expected.text_encoders[0].size());
     }
     const LoraSet found = match("same");
     ASSERT_EQ(found.unet.size(), expected.unet.size());
@@ -135,8 +138,56 @@ TEST_F(Lora, takes_the_alpha_that_diffusers_keeps_in_the_metadata) {
         R"({"unet.lora_alpha": 12, "unet.r": 4, "text_encoder.lora_alpha": 2, "text_encoder.r": 4})"}});
   const LoraSet set = match("scaled");
   EXPECT_DOUBLE_EQ(set.unet.at(kLinear).front().scale, 3.0);
-  EXPECT_DOUBLE_EQ(set.text_encoder.begin()->second.front().scale, 0.5);
+  EXPECT_DOUBLE_EQ(set.text_encoders[0].begin()->second.front().scale, 0.5);
   EXPECT_DOUBLE_EQ(match("plain").unet.at(kLinear).front().scale, 1.0);
+}
+
+TEST_F(Lora, is_read_under_the_names_that_comfyui_gives) {
+  make::write_lora(path("kohya"), model_,
+                   {.naming = LoraNaming::kKohyaLdm, .rank = 4, .text_encoder = false});
+  const nn::SafeTensors kohya(path("kohya"));
+  std::vector<nn::TensorEntry> renamed;
+  for (nn::TensorEntry tensor : kohya.tensors()) {
+    const std::string prefix = "lora_unet_";
+    ASSERT_TRUE(tensor.name.starts_with(prefix)) << tensor.name;
+    tensor.name = "diffusion_model." + tensor.name.substr(prefix.size());
+    renamed.push_back(tensor);
+  }
+  nn::write_safetensors(path("comfy"), renamed);
+  const LoraSet expected = match("kohya"), found = match("comfy");
+  ASSERT_FALSE(expected.unet.empty());
+  ASSERT_EQ(found.unet.size(), expected.unet.size());
+  EXPECT_TRUE(
+      at::equal(merged(unet_.table, found.unet, kLinear), merged(unet_.table, expected.unet, kLinear)));
+}
+
+TEST_F(Lora, words_that_lie_in_it_are_learned_and_do_not_stop_it) {
+  make::write_lora(path("plain"), model_, {.rank = 4});
+  const nn::SafeTensors plain(path("plain"));
+  const std::vector<float> vectors(2 * 128, 0.25f);
+  std::vector<nn::TensorEntry> tensors(plain.tensors().begin(), plain.tensors().end());
+  tensors.push_back({"bundle_emb.rustword.string_to_param.*",
+                     nn::ElementType::kF32,
+                     {2, 128},
+                     {reinterpret_cast<const uint8_t*>(vectors.data()), vectors.size() * sizeof(float)}});
+  nn::write_safetensors(path("bundle"), tensors);
+  EXPECT_EQ(match("bundle").unet.size(), match("plain").unet.size());
+  const std::vector<LearnedWord> words = read_bundled_words(path("bundle"), 128);
+  ASSERT_EQ(words.size(), 1u);
+  EXPECT_EQ(words[0].word, "rustword");
+  EXPECT_EQ(words[0].count, 2);
+  EXPECT_TRUE(read_bundled_words(path("plain"), 128).empty());
+  EXPECT_THROW(read_bundled_words(path("bundle"), 768), Error);
+}
+
+TEST_F(Lora, of_eight_bits_is_refused_when_it_is_matched) {
+  const std::string module = "lora_unet_mid_block_attentions_0_transformer_blocks_0_attn1_to_q";
+  const std::vector<uint8_t> bytes(4 * 64);
+  std::vector<nn::TensorEntry> tensors;
+  tensors.push_back({module + ".lora_down.weight", nn::ElementType::kF8E4M3, {4, 64}, bytes});
+  tensors.push_back({module + ".lora_up.weight", nn::ElementType::kF8E4M3, {64, 4}, bytes});
+  nn::write_safetensors(path("fp8"), tensors);
+  expect_refusal("fp8", "holds F8_E4M3, expected weights of F32, F16 or BF16");
 }
 
 TEST_F(Lora, several_add_up) {
@@ -145,7 +196,7 @@ TEST_F(Lora, several_add_up) {
   other.seed = 9;
   make::write_lora(path("b"), other, {});
   const std::vector<LoraChoice> both{{path("a"), 1.0f}, {path("b"), -0.5f}};
-  const LoraSet set = match_loras(both, unet_, text_);
+  const LoraSet set = match_loras(both, unet_, texts());
   EXPECT_EQ(set.unet.at(kLinear).size(), 2u);
   const at::Tensor change = merged(unet_.table, set.unet, kLinear) - plain(unet_.table, kLinear);
   const at::Tensor a = merged(unet_.table, match("a").unet, kLinear) - plain(unet_.table, kLinear);

@@ -72,8 +72,8 @@ TEST_F(Tree, gives_every_part_by_name) {
   const ModelParts parts = find_model_parts(paths);
   EXPECT_EQ(parts.unet.table.where, checkpoint());
   EXPECT_EQ(parts.vae.table.where.filename(), "soft.safetensors");
-  EXPECT_EQ(parts.controlnet_tile.table.where.filename(), "control_tile_fp16.safetensors");
-  EXPECT_EQ(parts.controlnet_normal.table.where.filename(), "control_normalbae.safetensors");
+  EXPECT_EQ(parts.controlnets[0].table.where.filename(), "control_tile_fp16.safetensors");
+  EXPECT_EQ(parts.controlnets[1].table.where.filename(), "control_normalbae.safetensors");
   EXPECT_EQ(parts.tokenizer, root() / "comfy" / "sd1_tokenizer");
   EXPECT_FALSE(parts.loras.unet.empty());
   ASSERT_EQ(parts.words.size(), 1u);
@@ -85,17 +85,17 @@ TEST_F(Tree, gives_every_part_by_name) {
 
 TEST_F(Tree, a_checkpoint_in_it_brings_the_others_along) {
   const ModelParts parts = find_model_parts({checkpoint(), {}, {}, {}});
-  EXPECT_EQ(parts.controlnet_tile.table.where.filename(), "control_tile_fp16.safetensors");
+  EXPECT_EQ(parts.controlnets[0].table.where.filename(), "control_tile_fp16.safetensors");
   EXPECT_EQ(parts.tokenizer, root() / "comfy" / "sd1_tokenizer");
 }
 
 TEST_F(Tree, what_is_missing_is_told_with_what_to_do) {
   expect_in("no checkpoint of that name", failure([&] { find_model_parts(by_name("nightmare")); }));
-  expect_in("(--model-dir)", failure([&] { find_model_parts({"nightmare", {}, {}, {}}); }));
+  expect_in("no model folder was given", failure([&] { find_model_parts({"nightmare", {}, {}, {}}); }));
   fs::remove(models() / "controlnet" / "control_tile_fp16.safetensors");
   const std::string message = failure([&] { find_model_parts(by_name("dream")); });
   expect_in("comes without a ControlNet for tile", message);
-  expect_in("--controlnet-tile FILE", message);
+  expect_in("comes without a ControlNet for tile; name a file or folder of one", message);
   make::write_controlnet(models() / "controlnet" / "tile.safetensors", model_, make::Layout::kDiffusers,
                          false);
   fs::remove_all(root() / "comfy");
@@ -162,7 +162,7 @@ TEST_F(Tree, sd2_without_a_sign_must_be_asked) {
   const ModelParts parts = find_model_parts(by_name("two"));
   EXPECT_TRUE(parts.ask_prediction);
   EXPECT_EQ(parts.pad_id, 0);
-  EXPECT_EQ(parts.controlnet_tile.table.where.filename(), "a_tile_for_sd2.safetensors");
+  EXPECT_EQ(parts.controlnets[0].table.where.filename(), "a_tile_for_sd2.safetensors");
   EXPECT_FALSE(find_model_parts(by_name("dream")).ask_prediction);
 }
 

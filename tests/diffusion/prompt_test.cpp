@@ -64,7 +64,7 @@ TEST(Prompt, loras_in_the_text_are_refused_with_the_option) {
     parse_prompt("rust <lora:grime:0.8>");
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(error.message().find("--lora"), std::string::npos);
+    EXPECT_NE(error.message().find("LoRAs are given beside the prompt"), std::string::npos);
   }
 }
 

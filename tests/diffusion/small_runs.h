@@ -15,7 +15,7 @@ namespace patina::test {
 using diffusion::EditInputs, diffusion::EditOptions, diffusion::Dtype, diffusion::Model, diffusion::Scheduler;
 
 inline const Model& tiny_model() {
-  static const Model model({data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, 0});
+  static const Model model({data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32});
   return model;
 }
 

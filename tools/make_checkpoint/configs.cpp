@@ -30,27 +30,28 @@ json encoder_json(const diffusion::UNetConfig& config) {
 
 Configs configs_of(Family family, Size size, int64_t vocabulary) {
   const bool full = size == Size::kFull, sd2 = family == Family::kSd2;
+  const diffusion::FamilyTraits& traits = diffusion::traits_of(family);
   Configs configs;
   configs.family = family;
 
   diffusion::TextEncoderConfig& text = configs.text_encoder;
   text.vocab_size = vocabulary > 0 ? vocabulary : 49408;
   text.eos_token_id = text.vocab_size - 1;
-  text.hidden_size = full ? (sd2 ? 1024 : 768) : 128;
+  text.hidden_size = full ? traits.text_width : 128;
   text.intermediate_size = 4 * text.hidden_size;
   text.num_layers = full ? (sd2 ? 23 : 12) : 2;
   text.num_heads = text.hidden_size / 64;
-  text.activation = sd2 ? diffusion::TextActivation::kGelu : diffusion::TextActivation::kQuickGelu;
+  text.activation = traits.activation;
 
   diffusion::UNetConfig& unet = configs.unet;
-  unet.use_linear_projection = sd2;
+  unet.use_linear_projection = traits.linear_projection;
   const std::vector<int64_t> channels = full  ? std::vector<int64_t>{320, 640, 1280, 1280}
                                         : sd2 ? std::vector<int64_t>{64, 64, 128, 128}
                                               : std::vector<int64_t>{32, 64, 64, 96};
   for (size_t i = 0; i < channels.size(); ++i) {
     const bool attention = i + 1 < channels.size();
-    unet.levels.push_back(
-        {channels[i], 2, sd2 ? channels[i] / 64 : 8, 1, text.hidden_size, attention, attention});
+    const int64_t heads = traits.head_width > 0 ? channels[i] / traits.head_width : traits.num_heads;
+    unet.levels.push_back({channels[i], 2, heads, 1, text.hidden_size, attention, attention});
   }
 
   configs.controlnet.unet = unet;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "patina/diffusion/files/config.h"
-#include "patina/diffusion/files/infer_config.h"
+#include "patina/diffusion/files/families.h"
 
 namespace patina::make_checkpoint {
 

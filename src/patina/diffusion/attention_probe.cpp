@@ -9,6 +9,7 @@
 #include "patina/base/check.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/edit_run.h"
+#include "patina/diffusion/files/unet_blocks.h"
 
 namespace patina::diffusion {
 namespace {
@@ -48,38 +49,22 @@ std::string short_name(const AttentionLayer& layer) {
 }
 
 std::vector<AttentionLayer> self_attention_layers(const Model& model, int width, int height) {
-  const UNetConfig& config = model.state().unet.config();
-  const size_t num_levels = config.levels.size();
-  std::vector<AttentionLayer> resolutions{{{}, width / model.latent_scale(), height / model.latent_scale()}};
-  for (size_t i = 1; i < num_levels; ++i) {
-    const AttentionLayer& finer = resolutions.back();
-    resolutions.push_back({{}, (finer.width + 1) / 2, (finer.height + 1) / 2});
-  }
+  const std::vector<LevelConfig>& levels = model.state().unet.config().levels;
+  const std::vector<LatentSize> sizes =
+      level_sizes({width / model.latent_scale(), height / model.latent_scale()}, levels.size());
+  std::vector<UNetBlock> blocks = down_blocks(levels);
+  blocks.push_back(mid_block(levels));
+  for (UNetBlock& block : up_blocks(levels)) blocks.push_back(std::move(block));
 
   std::vector<AttentionLayer> layers;
-  const auto add_transformers = [&](const std::string& block, size_t level_index, int64_t num_transformers) {
-    const LevelConfig& level = config.levels[level_index];
-    for (int64_t i = 0; i < num_transformers; ++i) {
-      for (int64_t t = 0; t < level.num_transformer_layers; ++t) {
-        AttentionLayer layer = resolutions[level_index];
-        layer.name = block + ".attentions." + std::to_string(i) + ".transformer_blocks." + std::to_string(t) +
-                     ".attn1";
-        layer.num_heads = level.num_heads;
-        layer.head_dim = level.channels / level.num_heads;
-        layers.push_back(std::move(layer));
-      }
+  for (const UNetBlock& block : blocks) {
+    const LevelConfig& level = levels[block.level];
+    for (const UNetLayer& layer : block.layers) {
+      for (int64_t t = 0; layer.transformer && t < level.num_transformer_layers; ++t)
+        layers.push_back({*layer.transformer + ".transformer_blocks." + std::to_string(t) + ".attn1",
+                          sizes[block.level].width, sizes[block.level].height, level.num_heads,
+                          level.channels / level.num_heads});
     }
-  };
-  for (size_t i = 0; i < num_levels; ++i) {
-    const LevelConfig& level = config.levels[i];
-    add_transformers("down_blocks." + std::to_string(i), i, level.down_attention ? level.num_layers : 0);
-  }
-  add_transformers("mid_block", num_levels - 1, 1);
-  for (size_t i = 0; i < num_levels; ++i) {
-    const size_t level_index = num_levels - 1 - i;
-    const LevelConfig& level = config.levels[level_index];
-    add_transformers("up_blocks." + std::to_string(i), level_index,
-                     level.up_attention ? level.num_layers + 1 : 0);
   }
   return layers;
 }
@@ -94,7 +79,7 @@ AttentionLayer find_layer(const std::vector<AttentionLayer>& layers, std::string
   for (const AttentionLayer& layer : layers) {
     if (name == layer.name || name == short_name(layer)) return layer;
   }
-  throw Error(ErrorCode::kUsage, "--layer",
+  throw Error(ErrorCode::kUsage, "layer",
               "there is no self-attention '" + printable(name) +
                   "'; there are, by latent pixels of the grid, " + layer_list(layers));
 }
@@ -108,7 +93,7 @@ CapturedAttention capture_attention(const Model& model, const EditInputs& inputs
   captured.num_evaluations = run->plan.num_calls() - run->start;
   captured.evaluation = evaluation == 0 ? (captured.num_evaluations + 1) / 2 : evaluation;
   if (captured.evaluation < 1 || captured.evaluation > captured.num_evaluations) {
-    throw Error(ErrorCode::kUsage, "--step",
+    throw Error(ErrorCode::kUsage, "step",
                 "expected 1 to " + std::to_string(captured.num_evaluations) +
                     ", the evaluations of this run, found " + std::to_string(captured.evaluation));
   }

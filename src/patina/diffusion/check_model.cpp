@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "patina/base/error.h"
+#include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/embedding.h"
 #include "patina/diffusion/list_models.h"
 #include "patina/diffusion/model.h"
@@ -25,7 +26,7 @@ std::string formatted(const char* format, auto... values) {
   return text;
 }
 
-/// Elements whose exponent is all ones: infinities and what is no number.
+/// Elements whose exponent is all ones: infinities and NaN.
 template <class Bits>
 size_t count_not_finite(std::span<const uint8_t> bytes, Bits exponent) {
   size_t count = 0;
@@ -78,10 +79,10 @@ std::string check_model_folder(const fs::path& folder) {
   std::string text = checked(open_unet(folder / "unet"));
   if (fs::is_directory(folder / "text_encoder")) text += checked(open_text_encoder(folder / "text_encoder"));
   if (fs::is_directory(folder / "vae")) text += checked(open_vae(folder / "vae"));
-  for (const char* name : {"controlnet_tile", "controlnet_normal"}) {
-    if (fs::is_directory(folder / name)) text += checked(open_controlnet(folder / name));
+  for (const ControlKind& kind : kControlKinds) {
+    if (fs::is_directory(folder / kind.component)) text += checked(open_controlnet(folder / kind.component));
   }
-  for (const char* name : {"unet", "text_encoder", "vae", "controlnet_tile", "controlnet_normal"}) {
+  for (const std::string& name : component_folders()) {
     if (fs::is_directory(folder / name)) check_values(open_weight_files(folder / name));
   }
   return text;
@@ -151,7 +152,7 @@ void check_values(const WeightFiles& files) {
   }
   if (num_faults > 0)
     throw Error(ErrorCode::kFormat, files.where.string(),
-                std::to_string(num_faults) + " tensors hold infinities or what is no number: " + faults);
+                std::to_string(num_faults) + " tensors hold infinities or NaN: " + faults);
 }
 
 std::string check_path(const fs::path& path) {
@@ -168,13 +169,15 @@ std::string check_path(const fs::path& path) {
   return text + "  All tensors are there, of the right shape, and finite.\n";
 }
 
-void check_model(const ModelPaths& paths) {
+void check_model(const ModelPaths& paths, std::optional<Scheduler> scheduler) {
   const ModelParts parts = find_model_parts(paths);
+  if (scheduler) {
+    if (const auto refusal = choose_scheduler(parts.scheduler, *scheduler).refusal) throw *refusal;
+  }
   check_tensors(parts.unet);
-  check_tensors(parts.text_encoder);
+  for (const TextPart& text : parts.texts) check_tensors(text.encoder);
   check_tensors(parts.vae);
-  check_tensors(parts.controlnet_tile);
-  check_tensors(parts.controlnet_normal);
+  for (const ControlNetPart& controlnet : parts.controlnets) check_tensors(controlnet);
 }
 
 std::vector<fs::path> model_files(const ModelPaths& paths) {

@@ -15,8 +15,7 @@ void check_tensors(const VaePart& part);
 void check_tensors(const TextEncoderPart& part);
 void check_tensors(const ControlNetPart& part);
 
-/// Throws Error{kFormat} naming the tensors that hold infinities or what is no number. Reads all of the
-/// files.
+/// Throws Error{kFormat} naming the tensors that hold infinities or NaN. Reads all of the files.
 void check_values(const WeightFiles& files);
 
 /// What a checkpoint, ControlNet, VAE, LoRA, embedding or diffusers folder is, in a few lines, after checking

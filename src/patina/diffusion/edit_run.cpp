@@ -7,6 +7,8 @@
 
 #include "patina/base/error.h"
 #include "patina/base/random.h"
+#include "patina/diffusion/control_kinds.h"
+#include "patina/diffusion/files/unet_blocks.h"
 
 namespace patina::diffusion {
 namespace {
@@ -19,7 +21,7 @@ std::string size_text(int64_t width, int64_t height) {
   return std::to_string(width) + " × " + std::to_string(height);
 }
 
-void check_views(const std::vector<Image>& views, const char* name, const GridSizes& sizes) {
+void check_views(const std::vector<Image>& views, const std::string& name, const GridSizes& sizes) {
   const auto expected = static_cast<size_t>(sizes.grid * sizes.grid);
   if (views.size() != expected) {
     usage(name, "there are " + std::to_string(views.size()) + " images, expected " +
@@ -34,26 +36,20 @@ void check_views(const std::vector<Image>& views, const char* name, const GridSi
   }
 }
 
-/// The biased levels must be the U-Net's own resolutions: each is half the last, rounded up as its strided
-/// convolutions do. Levels coarser than all of them are nobody's and may be there: correspondences are made
-/// without knowing how many levels a model has.
+/// The biased levels must be the U-Net's own resolutions. Levels coarser than all of them are not used and
+/// may be there: correspondences are made without knowing how many levels a model has.
 void check_bias(const std::vector<attention::KeyBuckets>& levels, const GridSizes& sizes, size_t num_levels) {
-  using Size = std::pair<int64_t, int64_t>;  // width, height
-  std::vector<Size> resolutions{{sizes.grid * sizes.latent_width, sizes.grid * sizes.latent_height}};
-  while (resolutions.size() < num_levels) {
-    const auto [width, height] = resolutions.back();
-    resolutions.emplace_back((width + 1) / 2, (height + 1) / 2);
-  }
-  const auto [coarsest_width, coarsest_height] = resolutions.back();
+  const std::vector<LatentSize> resolutions =
+      level_sizes({sizes.grid * sizes.latent_width, sizes.grid * sizes.latent_height}, num_levels);
   for (const attention::KeyBuckets& buckets : levels) {
     attention::validate(buckets);
-    if (buckets.width() < coarsest_width && buckets.height() < coarsest_height) continue;
-    if (std::find(resolutions.begin(), resolutions.end(), Size(buckets.width(), buckets.height())) ==
-        resolutions.end()) {
+    if (buckets.width() < resolutions.back().width && buckets.height() < resolutions.back().height) continue;
+    const LatentSize size{buckets.width(), buckets.height()};
+    if (std::find(resolutions.begin(), resolutions.end(), size) == resolutions.end()) {
       usage("bias", "a level is made for " + size_text(buckets.width(), buckets.height()) +
                         " latent pixels, which is no resolution of the "
                         "U-Net for a grid of " +
-                        size_text(resolutions[0].first, resolutions[0].second) +
+                        size_text(resolutions[0].width, resolutions[0].height) +
                         " latent pixels; views whose size is a multiple of 64 pixels always fit");
     }
   }
@@ -69,8 +65,8 @@ GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const Edit
     usage("tile views", "are " + size_text(first.width, first.height) + " pixels; expected multiples of " +
                             std::to_string(scale));
   }
-  check_views(inputs.tile_views, "tile views", sizes);
-  check_views(inputs.normal_views, "normal views", sizes);
+  for (const ControlKind& kind : kControlKinds)
+    check_views(inputs.*kind.views, std::string(kind.name) + " views", sizes);
   if (!inputs.start_views.empty()) check_views(inputs.start_views, "start views", sizes);
   const int64_t noise_size =
       model.latent_channels() * sizes.grid * sizes.grid * sizes.latent_height * sizes.latent_width;
@@ -78,7 +74,7 @@ GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const Edit
     usage("noise",
           "has " + std::to_string(inputs.noise.size()) + " values, expected " + std::to_string(noise_size));
   }
-  const auto in_range = [](const char* name, double value, double low, double high) {
+  const auto in_range = [](const std::string& name, double value, double low, double high) {
     if (!(value >= low && value <= high)) {
       usage(name, "is " + std::to_string(value) + ", expected " + std::to_string(low) + " to " +
                       std::to_string(high));
@@ -87,8 +83,8 @@ GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const Edit
   in_range("steps", options.num_steps, 1, 1000);
   in_range("guidance scale", options.guidance_scale, 0, 100);
   in_range("strength", options.strength, 0, 1);
-  in_range("tile scale", options.tile_scale, 0, 10);
-  in_range("normal scale", options.normal_scale, 0, 10);
+  for (const ControlKind& kind : kControlKinds)
+    in_range(std::string(kind.name) + " scale", options.*kind.scale, 0, 10);
   in_range("fine detail", options.fine_detail, 0, 1);
   in_range("bias", options.bias_weight, -1000, 1000);
   check_bias(inputs.bias_levels, sizes, model.state().unet.config().levels.size());
@@ -174,19 +170,23 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
   std::vector<std::string> prompts{options.prompt};
   const Guidance guidance = guidance_of(model, options);
   if (guidance.scale != 1) prompts.insert(prompts.begin(), guidance.negative_prompt);
-  const at::Tensor text = encode_prompts(networks.tokenizer, *networks.text_encoder.use(), networks.words,
-                                         prompts, options.clip_skip);
-  run->denoiser = {
-      &networks.unet,
-      {{&networks.controlnet_tile, grid_hint(networks.controlnet_tile, inputs.tile_views, sizes.grid),
-        options.tile_scale},
-       {&networks.controlnet_normal, grid_hint(networks.controlnet_normal, inputs.normal_views, sizes.grid),
-        options.normal_scale}},
-      text,
-      guidance.scale,
-      guides_in_one_batch(networks.unet.config(), run->shape[2] * run->shape[3]),
-      &run->bias,
-      options.bias_controlnet};
+  std::vector<TextConditioning> texts;
+  for (const TextStage& text : networks.texts)
+    texts.push_back(
+        encode_prompts(text.tokenizer, *text.encoder.use(), text.words, prompts, options.clip_skip));
+  std::vector<Control> controls;
+  for (size_t i = 0; i < kControlKinds.size(); ++i) {
+    const Held<ControlNet>& network = networks.controlnets[i];
+    controls.push_back({&network, grid_hint(network, inputs.*kControlKinds[i].views, sizes.grid),
+                        options.*kControlKinds[i].scale});
+  }
+  run->denoiser = {&networks.unet,
+                   std::move(controls),
+                   join_encoders(texts),
+                   guidance.scale,
+                   guides_in_one_batch(networks.unet.config(), run->shape[2] * run->shape[3]),
+                   &run->bias,
+                   options.bias_controlnet};
 
   // The start: the images at the noise level of the first step [Meng2022], or where an earlier run stood.
   SamplerState& state = run->state;

@@ -5,6 +5,8 @@
 #include <map>
 
 #include "patina/base/error.h"
+#include "patina/diffusion/control_kinds.h"
+#include "patina/diffusion/files/infer_config.h"
 #include "patina/diffusion/files/network_part.h"
 #include "patina/diffusion/files/search_folders.h"
 #include "patina/diffusion/text/find_tokenizer.h"
@@ -21,13 +23,6 @@ std::string lowered(std::string text) {
 
 std::string short_type(nn::ElementType type) {
   return lowered(std::string(nn::name_of(type)));
-}
-
-/// Families differ in the width of what they read of the text, where a file shows it.
-std::optional<Family> family_of_text_width(int64_t width) {
-  if (width == 768) return Family::kSd1;
-  if (width == 1024) return Family::kSd2;
-  return std::nullopt;
 }
 
 std::optional<Family> family_of_entry(const WeightFiles& files, FileKind kind) {
@@ -141,24 +136,23 @@ std::vector<ModelEntry> list_models(std::span<const fs::path> folders) {
 std::vector<std::string> what_is_missing(std::span<const ModelEntry> entries,
                                          std::span<const fs::path> folders) {
   std::vector<std::string> missing;
-  for (const Family family : {Family::kSd1, Family::kSd2}) {
+  for (const FamilyTraits& traits : kFamilies) {
     const auto any = [&](auto test) {
       return std::any_of(entries.begin(), entries.end(), [&](const ModelEntry& entry) {
-        return entry.refusal.empty() && entry.family == family && test(entry);
+        return entry.refusal.empty() && entry.family == traits.family && test(entry);
       });
     };
     if (!any([](const ModelEntry& e) { return e.kind == FileKind::kCheckpoint; })) continue;
-    for (const char* word : {"tile", "normal"}) {
+    for (const ControlKind& control : kControlKinds) {
       const bool found = any([&](const ModelEntry& e) {
         return e.kind == FileKind::kControlNet &&
-               lowered(e.path.filename().string()).find(word) != std::string::npos;
+               lowered(e.path.filename().string()).find(control.name) != std::string::npos;
       });
-      const bool inside = any([&](const ModelEntry& e) {
-        return e.is_model_folder && fs::exists(e.path / (std::string("controlnet_") + word));
-      });
+      const bool inside = any(
+          [&](const ModelEntry& e) { return e.is_model_folder && fs::exists(e.path / control.component); });
       if (!found && !inside)
-        missing.push_back(std::string("A ControlNet for ") + word + " of " + name_of(family) +
-                          " (a file whose name holds '" + word + "').");
+        missing.push_back(std::string("A ControlNet for ") + control.name + " of " + traits.name +
+                          " (a file whose name holds '" + control.name + "').");
     }
   }
   // Single files of one vocabulary need one tokenizer together.

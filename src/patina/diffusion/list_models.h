@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "patina/diffusion/files/infer_config.h"
+#include "patina/diffusion/files/families.h"
 #include "patina/diffusion/files/recognise.h"
 
 namespace patina::diffusion {

@@ -29,12 +29,17 @@ EditMemory predict_memory(const Model& model, int grid, int view_width, int view
   const auto bytes_of = [&](const auto& held) {
     return held.is_resident() ? held.use()->num_bytes() : held.num_parameters() * bytes;
   };
-  const int64_t text = bytes_of(networks.text_encoder), vae = bytes_of(networks.vae),
-                tile = bytes_of(networks.controlnet_tile), normal = bytes_of(networks.controlnet_normal);
+  // Of networks that are read anew for each use one is in memory at a time.
+  int64_t sum = 0, largest = 0;
+  const auto add = [&](const auto& held) {
+    sum += bytes_of(held);
+    largest = std::max(largest, bytes_of(held));
+  };
+  for (const TextStage& text : networks.texts) add(text.encoder);
+  for (const Held<ControlNet>& controlnet : networks.controlnets) add(controlnet);
+  add(networks.vae);
   EditMemory memory;
-  const int64_t weights =
-      networks.unet.num_bytes() +
-      (networks.vae.is_resident() ? text + vae + tile + normal : std::max({text, vae, tile, normal}));
+  const int64_t weights = networks.unet.num_bytes() + (networks.vae.is_resident() ? sum : largest);
   memory.weights =
       kLibraryBytes + weights + static_cast<int64_t>(kKeptFromConverting * static_cast<double>(weights));
 

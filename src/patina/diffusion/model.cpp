@@ -3,11 +3,11 @@
 #include <cstdio>
 
 #include <ATen/ATen.h>
-#include <ATen/Parallel.h>
 #include <c10/core/InferenceMode.h>
 
 #include "patina/base/error.h"
-#include "patina/base/parallel.h"
+#include "patina/diffusion/control_kinds.h"
+#include "patina/diffusion/files/unet_blocks.h"
 #include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/model_state.h"
 #include "patina/diffusion/networks/component.h"
@@ -42,65 +42,84 @@ const char* name_of(Dtype dtype) {
   return dtype == Dtype::kBf16 ? "bf16" : dtype == Dtype::kF16 ? "f16" : "f32";
 }
 
+/// One size of a network against that of another.
+void check_size(int64_t found, int64_t expected, const std::string& what) {
+  if (found != expected) {
+    throw Error(ErrorCode::kFormat, "model",
+                what + ": found " + std::to_string(found) + ", expected " + std::to_string(expected) +
+                    "; the components belong to different models");
+  }
+}
+
+void check_text_width(const UNetConfig& network, int64_t text_width, const std::string& what) {
+  for (const LevelConfig& level : network.levels) {
+    if (level.down_attention || level.up_attention) check_size(level.cross_attention_dim, text_width, what);
+  }
+}
+
+/// A ControlNet adds to what the U-Net keeps on its way down.
+void check_fit(const ControlNetConfig& control, const std::string& name, const Model::State& state,
+               int64_t text_width) {
+  const UNetConfig &copy = control.unet, &unet = state.unet.config();
+  const std::string what = "ControlNet " + name + ": ";
+  const std::vector<int64_t> kept = skip_channels(unet.levels), found = skip_channels(copy.levels);
+  check_size(copy.in_channels, unet.in_channels, what + "in_channels");
+  check_size(static_cast<int64_t>(found.size()), static_cast<int64_t>(kept.size()),
+             what + "number of residuals");
+  for (size_t i = 0; i < kept.size(); ++i) check_size(found[i], kept[i], what + "channels of a residual");
+  check_text_width(copy, text_width, what + "cross_attention_dim");
+  check_size(int64_t{1} << (control.embedding_channels.size() - 1), state.vae.config().latent_scale(),
+             what + "pixels a latent pixel");
+}
+
 /// The networks must fit each other: what one gives is what the next takes.
 void check_fit(const Model::State& state) {
-  const auto check = [](int64_t found, int64_t expected, const char* what) {
-    if (found != expected) {
-      throw Error(ErrorCode::kFormat, "model",
-                  std::string(what) + ": found " + std::to_string(found) + ", expected " +
-                      std::to_string(expected) + "; the components belong to different models");
-    }
-  };
   const UNetConfig& unet = state.unet.config();
-  for (const LevelConfig& level : unet.levels) {
-    if (level.down_attention || level.up_attention) {
-      check(level.cross_attention_dim, state.text_encoder.config().hidden_size,
-            "cross_attention_dim of the U-Net against the text encoder's width");
-    }
+  int64_t text_width = 0;
+  for (const TextStage& text : state.texts) text_width += text.encoder.config().hidden_size;
+  check_text_width(unet, text_width, "cross_attention_dim of the U-Net against the text encoder's width");
+  check_size(unet.in_channels, state.vae.config().latent_channels,
+             "in_channels of the U-Net against the VAE's latent channels");
+  check_size(unet.out_channels, unet.in_channels, "out_channels of the U-Net");
+  check_size(state.vae.config().in_channels, 3, "in_channels of the VAE");
+  for (size_t i = 0; i < kControlKinds.size(); ++i)
+    check_fit(state.controlnets[i].config(), kControlKinds[i].name, state, text_width);
+}
+
+/// All text encoders with their tokenizers and words.
+std::vector<TextStage> load_texts(const ModelParts& parts, nn::Placement placement, bool resident) {
+  std::vector<TextStage> stages;
+  for (size_t i = 0; i < parts.texts.size(); ++i) {
+    const TextPart& text = parts.texts[i];
+    stages.push_back(
+        {Tokenizer(text.tokenizer, text.pad_id),
+         hold_network<TextEncoder>(text.encoder, placement, resident, parts.loras.text_encoders[i]),
+         load_words(text.words, text.encoder.config, placement)});
   }
-  check(unet.in_channels, state.vae.config().latent_channels,
-        "in_channels of the U-Net against the VAE's latent channels");
-  check(unet.out_channels, unet.in_channels, "out_channels of the U-Net");
-  check(state.vae.config().in_channels, 3, "in_channels of the VAE");
-  const std::vector<int64_t> kept = skip_channels(unet);
-  for (const auto& [control, name] :
-       {std::pair(&state.controlnet_tile, "tile"), std::pair(&state.controlnet_normal, "normal")}) {
-    const UNetConfig& copy = control->config().unet;
-    const std::string what = std::string("ControlNet ") + name + ": ";
-    check(copy.in_channels, unet.in_channels, (what + "in_channels").c_str());
-    check(static_cast<int64_t>(skip_channels(copy).size()), static_cast<int64_t>(kept.size()),
-          (what + "number of residuals").c_str());
-    for (size_t i = 0; i < kept.size(); ++i)
-      check(skip_channels(copy)[i], kept[i], (what + "channels of a residual").c_str());
-    for (const LevelConfig& level : copy.levels) {
-      if (level.down_attention) {
-        check(level.cross_attention_dim, state.text_encoder.config().hidden_size,
-              (what + "cross_attention_dim").c_str());
-      }
-    }
-    check(int64_t{1} << (control->config().embedding_channels.size() - 1), state.vae.config().latent_scale(),
-          (what + "pixels a latent pixel").c_str());
-  }
+  return stages;
+}
+
+std::vector<Held<ControlNet>> load_controlnets(const ModelParts& parts, nn::Placement placement,
+                                               bool resident) {
+  std::vector<Held<ControlNet>> networks;
+  for (const ControlNetPart& part : parts.controlnets)
+    networks.push_back(hold_network<ControlNet>(part, placement, resident));
+  return networks;
 }
 
 }  // namespace
 
 void check_device(Device device, Dtype dtype) {
   if (device == Device::kCuda && !at::hasCUDA())
-    throw Error(ErrorCode::kDevice, "--device cuda",
-                "there is no CUDA device here, or this patina was built without CUDA (docs/models.md)");
+    throw Error(
+        ErrorCode::kDevice, "device",
+        "is cuda, but there is no CUDA device here, or this patina was built without CUDA (docs/models.md)");
   if (dtype == Dtype::kF16 && resolve(device) == Device::kCpu)
-    throw Error(ErrorCode::kUsage, "--dtype f16", "is for --device cuda; on a processor take bf16 or f32");
+    throw Error(ErrorCode::kUsage, "dtype", "f16 is for CUDA alone; on a processor take bf16 or f32");
 }
 
 Model::Model(const ModelPaths& paths, const ModelOptions& options) {
   check_device(options.device, options.dtype);
-  if (options.num_threads < 0) {
-    throw Error(ErrorCode::kUsage, "threads",
-                "is " + std::to_string(options.num_threads) + ", expected 0 (all) or more");
-  }
-  set_num_threads(options.num_threads);
-  at::set_num_threads(patina::num_threads());
 
   const c10::InferenceMode inference;
   const ModelParts parts = find_model_parts(paths);
@@ -109,20 +128,17 @@ Model::Model(const ModelPaths& paths, const ModelOptions& options) {
   const nn::Placement placement{scalar_type(dtype), device == Device::kCuda ? c10::kCUDA : c10::kCPU,
                                 options.low_memory};
   const bool resident = !options.low_memory;
-  state_ = std::unique_ptr<State>(
-      new State{dtype, device, Tokenizer(parts.tokenizer, parts.pad_id),
-                hold_network<TextEncoder>(parts.text_encoder, placement, resident, parts.loras.text_encoder),
-                load_network<UNet>(parts.unet, placement, &parts.loras.unet),
-                hold_network<Vae>(parts.vae, placement, resident),
-                hold_network<ControlNet>(parts.controlnet_tile, placement, resident),
-                hold_network<ControlNet>(parts.controlnet_normal, placement, resident), parts.scheduler,
-                parts.guidance, load_words(parts.words, parts.text_encoder.config, placement), parts.notes});
+  state_ = std::unique_ptr<State>(new State{dtype, device, load_texts(parts, placement, resident),
+                                            load_network<UNet>(parts.unet, placement, &parts.loras.unet),
+                                            hold_network<Vae>(parts.vae, placement, resident),
+                                            load_controlnets(parts, placement, resident), parts.scheduler,
+                                            parts.guidance, parts.notes});
   check_fit(*state_);
   if (parts.ask_prediction) {
     state_->scheduler.prediction = ask_prediction(state_->unet, state_->scheduler);
     state_->notes.push_back(std::string("the U-Net predicts ") +
                             (state_->scheduler.prediction == Prediction::kV ? "v" : "noise") +
-                            " by its answer to noise (--prediction says otherwise)");
+                            " by its answer to noise");
   }
 }
 
@@ -150,12 +166,14 @@ std::string Model::description() const {
     std::snprintf(text, sizeof text, "%.1f M", static_cast<double>(count) * 1e-6);
     return std::string(text);
   };
+  int64_t text_parameters = 0;
+  for (const TextStage& text : s.texts) text_parameters += text.encoder.num_parameters();
   std::string notes;
   for (const std::string& note : s.notes) notes += "; " + note;
   return std::string(name_of(family_of(s.unet.config()))) + " architecture, U-Net " +
-         millions(s.unet.num_parameters()) + ", ControlNets 2 × " +
-         millions(s.controlnet_tile.num_parameters()) + ", VAE " + millions(s.vae.num_parameters()) +
-         ", text encoder " + millions(s.text_encoder.num_parameters()) + " parameters, " + name_of(s.dtype) +
+         millions(s.unet.num_parameters()) + ", ControlNets " + std::to_string(s.controlnets.size()) + " × " +
+         millions(s.controlnets.front().num_parameters()) + ", VAE " + millions(s.vae.num_parameters()) +
+         ", text encoder " + millions(text_parameters) + " parameters, " + name_of(s.dtype) +
          (s.device == Device::kCuda ? " on CUDA" : "") + notes;
 }
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,8 @@
 namespace patina::diffusion {
 
 /// Looks at the folders and weight files of a model without loading it. Throws Error that names what is
-/// missing, broken or a pickle.
-void check_model(const ModelPaths& paths);
+/// missing, broken or a pickle, or a setting of `scheduler`, if one is given, that patina lacks.
+void check_model(const ModelPaths& paths, std::optional<Scheduler> scheduler = std::nullopt);
 
 /// Throws Error if there is no such device here, or it does not compute in this precision.
 void check_device(Device device, Dtype dtype);

@@ -8,6 +8,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/search_folders.h"
 #include "patina/diffusion/list_models.h"
 #include "patina/diffusion/text/find_tokenizer.h"
@@ -17,8 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-constexpr int64_t kOpenClipPadId = 0;  // OpenCLIP pads with zeros, whatever the tokenizer's files say
 
 std::string lowered(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -57,7 +56,7 @@ class Folders {
   std::string text() const {
     std::string list;
     for (const fs::path& folder : folders_) list += (list.empty() ? "" : ", ") + folder.string();
-    return list.empty() ? "no model folder was given (--model-dir)" : "the model folders are " + list;
+    return list.empty() ? "no model folder was given" : "the model folders are " + list;
   }
 
  private:
@@ -98,25 +97,20 @@ std::optional<fs::path> controlnet_named(const std::string& word, const UNetConf
   return std::nullopt;
 }
 
-struct ControlNetPlace {
-  const char* option;     // of the command line
-  const char* component;  // folder in a diffusers model
-  const char* word;       // in the names of files
-};
-
-ControlNetPart find_controlnet(const fs::path& given, const ControlNetPlace& place, const ModelPaths& paths,
-                               const UNetConfig& unet, Folders& folders, ModelParts& parts) {
-  if (!given.empty()) return open_controlnet(resolve(given, FileKind::kControlNet, folders));
-  const fs::path component = paths.model / place.component;
+ControlNetPart find_controlnet(const ControlKind& kind, const ModelPaths& paths, Folders& folders,
+                               ModelParts& parts) {
+  if (const fs::path& given = paths.*kind.path; !given.empty())
+    return open_controlnet(resolve(given, FileKind::kControlNet, folders));
+  const fs::path component = paths.model / kind.component;
   if (fs::exists(component)) return open_controlnet(component);
-  if (const auto found = controlnet_named(place.word, unet, folders)) {
-    parts.notes.push_back(std::string("ControlNet ") + place.word + ": " + found->string());
+  if (const auto found = controlnet_named(kind.name, parts.unet.config, folders)) {
+    parts.notes.push_back(std::string("ControlNet ") + kind.name + ": " + found->string());
     return open_controlnet(*found);
   }
   throw Error(ErrorCode::kNotFound, paths.model.string(),
-              std::string("comes without a ControlNet for ") + place.word + "; name one (" + place.option +
-                  " FILE), or put one for " + name_of(family_of(unet)) + " whose name holds '" + place.word +
-                  "' into a model folder (" + folders.text() + ")");
+              std::string("comes without a ControlNet for ") + kind.name +
+                  "; name a file or folder of one, or put one for " + name_of(parts.family) +
+                  " whose name holds '" + kind.name + "' into a model folder (" + folders.text() + ")");
 }
 
 /// Models of other tasks have the same tensors but for the first convolution, which takes more than it gives.
@@ -152,13 +146,12 @@ void read_model_index(ModelParts& parts, const fs::path& folder) {
                   "_guidance_scale is " + scale.dump() + ", expected 1 to 50");
   }
   const std::string name = text("_class_name");
-  if (name.empty() || name.starts_with("StableDiffusionPipeline") ||
-      name.starts_with("StableDiffusionImg2Img") || name.starts_with("StableDiffusionControlNet") ||
-      name.starts_with("Patina"))
+  if (name.empty() || std::any_of(kPipelineClasses.begin(), kPipelineClasses.end(),
+                                  [&](std::string_view known) { return name.starts_with(known); }))
     return;
   throw Error(ErrorCode::kUnsupported, file.string(),
-              "is the index of a " + printable(name, 80) +
-                  "; patina runs Stable Diffusion 1.x and 2.x (StableDiffusionPipeline)");
+              "is the index of a " + printable(name, 80) + "; patina runs " + kFamilyNames +
+                  " (StableDiffusionPipeline)");
 }
 
 /// "parameterization: v" in the settings that the original implementation keeps beside a checkpoint.
@@ -190,8 +183,8 @@ void find_prediction(ModelParts& parts, const ModelPaths& paths, const fs::path&
     prediction = Prediction::kV;
     return;
   }
-  // SD 1.x predicts noise but for fine-tunes that bring one of the signs above; of SD 2.x both are common.
-  parts.ask_prediction = parts.family == Family::kSd2;
+  // Other families predict noise, but for fine-tunes that bring one of the signs above.
+  parts.ask_prediction = traits_of(parts.family).prediction_varies;
 }
 
 void open_diffusers_folder(ModelParts& parts, const ModelPaths& paths, const fs::path& model) {
@@ -204,12 +197,12 @@ void open_diffusers_folder(ModelParts& parts, const ModelPaths& paths, const fs:
     return folder;
   };
   parts.unet = open_unet(component("unet"));
-  if (paths.text_encoder.empty()) parts.text_encoder = open_text_encoder(component("text_encoder"));
+  if (paths.text_encoder.empty()) parts.texts.push_back({open_text_encoder(component("text_encoder"))});
   if (paths.vae.empty()) parts.vae = open_vae(component("vae"));
   const fs::path scheduler = component("scheduler") / "scheduler_config.json";
   parts.scheduler = parse_scheduler_config(read_text_file(scheduler, 1 << 24), scheduler.string());
   parts.files.push_back(scheduler);
-  for (const char* name : {"unet", "text_encoder", "vae", "controlnet_tile", "controlnet_normal"}) {
+  for (const std::string& name : component_folders()) {
     if (fs::exists(model / name / "config.json")) parts.files.push_back(model / name / "config.json");
   }
 }
@@ -219,18 +212,18 @@ void open_single_file(ModelParts& parts, const ModelPaths& paths, const fs::path
   require_kind(files, FileKind::kCheckpoint);
   parts.unet = open_unet(file);
   parts.family = family_of(parts.unet.config);
-  const auto require = [&](Network network, const char* option) {
+  const auto require = [&](Network network) {
     if (find_network(files, network)) return;
     throw Error(ErrorCode::kNotFound, file.string(),
-                std::string("holds no ") + name_of(network) + "; name one (" + option +
-                    " FILE), as a component's folder, a file of its own or another checkpoint");
+                std::string("holds no ") + name_of(network) +
+                    "; name one: a component's folder, a file of its own or another checkpoint");
   };
   if (paths.text_encoder.empty()) {
-    require(Network::kTextEncoder, "--text-encoder");
-    parts.text_encoder = open_text_encoder(file);
+    require(Network::kTextEncoder);
+    parts.texts.push_back({open_text_encoder(file)});
   }
   if (paths.vae.empty()) {
-    require(Network::kVae, "--vae");
+    require(Network::kVae);
     parts.vae = open_vae(file);
   }
   find_prediction(parts, paths, file, files);
@@ -243,14 +236,17 @@ void add_files(std::vector<fs::path>& list, const TensorTable& table) {
   }
 }
 
-/// Words of the files given, then of those in the model folders that fit this model.
-void find_words(ModelParts& parts, const ModelPaths& paths, Folders& folders) {
-  const int64_t width = parts.text_encoder.config.hidden_size;
+/// Words of the files given, of the LoRAs, then of those in the model folders that fit this model.
+void find_words(TextPart& text, ModelParts& parts, const ModelPaths& paths, Folders& folders) {
+  const int64_t width = text.encoder.config.hidden_size;
   const auto add = [&](const fs::path& path) {
-    for (LearnedWord& word : read_embedding(path, width)) parts.words.push_back(std::move(word));
+    for (LearnedWord& word : read_embedding(path, width)) text.words.push_back(std::move(word));
     parts.files.push_back(path);
   };
   for (const fs::path& given : paths.embeddings) add(resolve(given, FileKind::kEmbedding, folders));
+  for (const fs::path& lora : parts.loras.files) {
+    for (LearnedWord& word : read_bundled_words(lora, width)) text.words.push_back(std::move(word));
+  }
   for (const fs::path& path : folders.found().weights) {
     // Embeddings are small; a look at the size spares reading the headers of everything else.
     constexpr uintmax_t kMaxEmbeddingBytes = 4'000'000;
@@ -263,7 +259,49 @@ void find_words(ModelParts& parts, const ModelPaths& paths, Folders& folders) {
   }
 }
 
+/// The tokenizer of a text encoder, and how it pads.
+void find_tokenizer_of(TextPart& text, const ModelPaths& paths, const Folders& folders) {
+  text.tokenizer = find_tokenizer(
+      {paths.tokenizer, paths.model, folders.for_tokenizers(), text.encoder.config.vocab_size});
+  // A diffusers folder's own tokenizer says how it pads; one from elsewhere is CLIP's and does not know.
+  const bool from_elsewhere =
+      !fs::is_directory(paths.model) || text.encoder.table.naming == Naming::kOpenClip;
+  if (!from_elsewhere) return;
+  for (const FamilyTraits& traits : kFamilies)
+    if (traits.activation == text.encoder.config.activation) text.pad_id = traits.pad_id;
+}
+
+/// LoRAs change the U-Net and the text encoders.
+LoraSet find_loras(const ModelParts& parts, const ModelPaths& paths, Folders& folders) {
+  std::vector<LoraChoice> choices = paths.loras;
+  for (LoraChoice& lora : choices) lora.file = resolve(lora.file, FileKind::kLora, folders);
+  std::vector<const TensorTable*> texts;
+  for (const TextPart& text : parts.texts) texts.push_back(&text.encoder.table);
+  return match_loras(choices, parts.unet, texts);
+}
+
+/// Every file behind the parts, beside those that are noted already.
+void note_files(ModelParts& parts) {
+  add_files(parts.files, parts.unet.table);
+  for (const TextPart& text : parts.texts) add_files(parts.files, text.encoder.table);
+  add_files(parts.files, parts.vae.table);
+  for (const ControlNetPart& controlnet : parts.controlnets) add_files(parts.files, controlnet.table);
+  parts.files.insert(parts.files.end(), parts.loras.files.begin(), parts.loras.files.end());
+  for (const TextPart& text : parts.texts) {
+    for (const char* name :
+         {"merges.txt", "vocab.json", "tokenizer_config.json", "special_tokens_map.json"}) {
+      if (fs::exists(text.tokenizer / name)) parts.files.push_back(text.tokenizer / name);
+    }
+  }
+}
+
 }  // namespace
+
+std::vector<std::string> component_folders() {
+  std::vector<std::string> names{"unet", "text_encoder", "vae"};
+  for (const ControlKind& kind : kControlKinds) names.emplace_back(kind.component);
+  return names;
+}
 
 ModelParts find_model_parts(const ModelPaths& paths) {
   nn::refuse_pickle_name(paths.model);
@@ -279,38 +317,18 @@ ModelParts find_model_parts(const ModelPaths& paths) {
   parts.family = family_of(parts.unet.config);
   check_task(parts.unet);
   if (!paths.text_encoder.empty())
-    parts.text_encoder = open_text_encoder(resolve(paths.text_encoder, FileKind::kTextEncoder, folders));
+    parts.texts.push_back({open_text_encoder(resolve(paths.text_encoder, FileKind::kTextEncoder, folders))});
   if (!paths.vae.empty()) parts.vae = open_vae(resolve(paths.vae, FileKind::kVae, folders));
   if (paths.prediction != PredictionChoice::kAuto)
     parts.scheduler.prediction =
         paths.prediction == PredictionChoice::kV ? Prediction::kV : Prediction::kEpsilon;
 
-  parts.controlnet_tile =
-      find_controlnet(paths.controlnet_tile, {"--controlnet-tile", "controlnet_tile", "tile"}, resolved,
-                      parts.unet.config, folders, parts);
-  parts.controlnet_normal =
-      find_controlnet(paths.controlnet_normal, {"--controlnet-normal", "controlnet_normal", "normal"},
-                      resolved, parts.unet.config, folders, parts);
-  parts.tokenizer = find_tokenizer(
-      {paths.tokenizer, resolved.model, folders.for_tokenizers(), parts.text_encoder.config.vocab_size});
-  // A diffusers folder's own tokenizer says how it pads; one from elsewhere is CLIP's and does not know.
-  const bool is_openclip = parts.text_encoder.config.activation == TextActivation::kGelu;
-  const bool from_elsewhere =
-      !fs::is_directory(resolved.model) || parts.text_encoder.table.naming == Naming::kOpenClip;
-  if (is_openclip && from_elsewhere) parts.pad_id = kOpenClipPadId;
-
-  std::vector<LoraChoice> loras = paths.loras;
-  for (LoraChoice& lora : loras) lora.file = resolve(lora.file, FileKind::kLora, folders);
-  parts.loras = match_loras(loras, parts.unet, parts.text_encoder);
-  find_words(parts, paths, folders);
-
-  for (const TensorTable* table : {&parts.unet.table, &parts.text_encoder.table, &parts.vae.table,
-                                   &parts.controlnet_tile.table, &parts.controlnet_normal.table})
-    add_files(parts.files, *table);
-  parts.files.insert(parts.files.end(), parts.loras.files.begin(), parts.loras.files.end());
-  for (const char* name : {"merges.txt", "vocab.json", "tokenizer_config.json", "special_tokens_map.json"}) {
-    if (fs::exists(parts.tokenizer / name)) parts.files.push_back(parts.tokenizer / name);
-  }
+  for (const ControlKind& kind : kControlKinds)
+    parts.controlnets.push_back(find_controlnet(kind, resolved, folders, parts));
+  for (TextPart& text : parts.texts) find_tokenizer_of(text, resolved, folders);
+  parts.loras = find_loras(parts, resolved, folders);
+  for (TextPart& text : parts.texts) find_words(text, parts, paths, folders);
+  note_files(parts);
   return parts;
 }
 

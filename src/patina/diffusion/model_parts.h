@@ -3,11 +3,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "patina/diffusion/files/embedding.h"
-#include "patina/diffusion/files/infer_config.h"
+#include "patina/diffusion/files/families.h"
 #include "patina/diffusion/files/lora.h"
 #include "patina/diffusion/files/network_part.h"
 #include "patina/diffusion/options.h"
@@ -15,22 +16,30 @@
 
 namespace patina::diffusion {
 
+/// A text encoder and what belongs to it alone.
+struct TextPart {
+  TextEncoderPart encoder;
+  std::filesystem::path tokenizer;
+  std::optional<int64_t> pad_id;  // where the family wants another than the tokenizer's files say
+  std::vector<LearnedWord> words;
+};
+
 struct ModelParts {
   Family family = Family::kSd1;
   UNetPart unet;
-  TextEncoderPart text_encoder;
+  std::vector<TextPart> texts;
   VaePart vae;
-  ControlNetPart controlnet_tile, controlnet_normal;
-  std::filesystem::path tokenizer;
-  std::optional<int64_t> pad_id;  // of the tokenizer, where the family wants another than its files say
+  std::vector<ControlNetPart> controlnets;  // in the order of kControlKinds
   SchedulerConfig scheduler;
   Guidance guidance;            // where the user names nothing else
   bool ask_prediction = false;  // nothing tells what the U-Net predicts: it must be asked (prediction.h)
   LoraSet loras;
-  std::vector<LearnedWord> words;
   std::vector<std::filesystem::path> files;  // all that was opened
   std::vector<std::string> notes;            // what was taken from where without being told to
 };
+
+/// The folders of a diffusers model that hold networks.
+std::vector<std::string> component_folders();
 
 /// Finds every part in the order: what `paths` names, the model itself, the model folders. A name that is no
 /// path is looked for in the model folders. Throws Error that names what is missing or does not fit, and what

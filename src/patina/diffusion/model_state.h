@@ -2,7 +2,8 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <string>
+#include <vector>
 
 #include "patina/diffusion/model.h"
 #include "patina/diffusion/model_parts.h"
@@ -16,17 +17,22 @@
 
 namespace patina::diffusion {
 
+/// From a prompt to tokens' vectors.
+struct TextStage {
+  Tokenizer tokenizer;
+  Held<TextEncoder> encoder;
+  LearnedWords words;
+};
+
 struct Model::State {
   Dtype dtype = Dtype::kF32;
   Device device = Device::kCpu;
-  Tokenizer tokenizer;
-  Held<TextEncoder> text_encoder;
+  std::vector<TextStage> texts;
   UNet unet;
   Held<Vae> vae;
-  Held<ControlNet> controlnet_tile, controlnet_normal;
+  std::vector<Held<ControlNet>> controlnets;  // in the order of kControlKinds
   SchedulerConfig scheduler;
-  Guidance guidance;  // where the user names nothing else
-  LearnedWords words;
+  Guidance guidance;               // where the user names nothing else
   std::vector<std::string> notes;  // what was chosen without being told to, for the description
 };
 

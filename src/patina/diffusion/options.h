@@ -39,7 +39,6 @@ struct ModelPaths {
 
 struct ModelOptions {
   Dtype dtype = Dtype::kAuto;
-  int num_threads = 0;            // 0: all processors
   bool low_memory = false;        // all networks but the U-Net are read anew for each use
   Device device = Device::kAuto;  // kAuto: CUDA where patina was built with it and finds a GPU
 };

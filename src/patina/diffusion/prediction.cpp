@@ -20,7 +20,7 @@ Prediction ask_prediction(const UNet& unet, const SchedulerConfig& scheduler) {
   const at::Tensor text =
       at::zeros({1, kTokens, unet.config().levels.front().cross_attention_dim}, at::kFloat);
   const at::Tensor output =
-      unet({sample, at::full({1}, last_timestep, at::kFloat), text}).to(at::kCPU, at::kFloat);
+      unet({sample, at::full({1}, last_timestep, at::kFloat), {text, {}}}).to(at::kCPU, at::kFloat);
   const at::Tensor a = sample - sample.mean(), b = output - output.mean();
   const double spread = (a.norm() * b.norm()).item<double>();
   const double correlation = spread > 0 ? (a * b).sum().item<double>() / spread : 0.0;

@@ -20,25 +20,28 @@ std::span<const float> values_of(const at::Tensor& tensor) {
 }  // namespace
 
 Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
-  PATINA_CHECK(text.size(0) == (guidance_scale == 1 ? 1 : 2));
+  PATINA_CHECK(text.tokens.size(0) == (guidance_scale == 1 ? 1 : 2));
   const at::Tensor timesteps = at::full({1}, timestep, at::kFloat);
-  const std::vector<at::Tensor> texts = at::split(text, one_batch ? 2 : 1);
-  std::vector<at::Tensor> samples;
-  for (const at::Tensor& prompts : texts) samples.push_back(latents.expand({prompts.size(0), -1, -1, -1}));
+  std::vector<NetworkInputs> evaluations;
+  for (TextConditioning& prompts : split_prompts(text, one_batch ? 2 : 1)) {
+    const at::Tensor samples = latents.expand({prompts.tokens.size(0), -1, -1, -1});
+    evaluations.push_back({samples, timesteps, std::move(prompts), bias});
+  }
 
   // ControlNets outside: with little memory each is read from its file for this loop.
-  std::vector<ControlResiduals> residuals(texts.size());
+  std::vector<ControlResiduals> residuals(evaluations.size());
   for (const Control& control : controls) {
     if (control.scale == 0) continue;
     const std::shared_ptr<const ControlNet> network = control.network->use();
-    for (size_t i = 0; i < texts.size(); ++i)
-      residuals[i] =
-          sum(std::move(residuals[i]), (*network)(samples[i], timesteps, texts[i], control.hint,
-                                                  control.scale, {}, bias_controls ? bias : nullptr));
+    for (size_t i = 0; i < evaluations.size(); ++i) {
+      NetworkInputs inputs = evaluations[i];
+      if (!bias_controls) inputs.bias = nullptr;
+      residuals[i] = sum(std::move(residuals[i]), (*network)(inputs, control.hint, control.scale));
+    }
   }
   std::vector<at::Tensor> outputs;
-  for (size_t i = 0; i < texts.size(); ++i)
-    outputs.push_back((*unet)({samples[i], timesteps, texts[i], std::move(residuals[i]), bias}, record));
+  for (size_t i = 0; i < evaluations.size(); ++i)
+    outputs.push_back((*unet)(evaluations[i], std::move(residuals[i]), record));
   const at::Tensor out = at::cat(outputs).to(at::kCPU, at::kFloat).contiguous();
   if (guidance_scale == 1) return {out, out, out};
   const at::Tensor unconditional = out.slice(0, 0, 1), conditional = out.slice(0, 1, 2);

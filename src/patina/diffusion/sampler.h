@@ -31,7 +31,7 @@ struct Guided {
 struct Denoiser {
   const UNet* unet = nullptr;
   std::vector<Control> controls;
-  at::Tensor text;  // [2,T,D], negative prompt first; [1,T,D] without guidance
+  TextConditioning text;  // of two prompts, the negative one first; of one without guidance
   float guidance_scale = 1;
   bool one_batch = true;  // both prompts of guidance in one evaluation; else in turn, the negative one first
   const nn::SelfAttentionBias* bias = nullptr;  // null: none

@@ -410,4 +410,18 @@ void write_safetensors(const std::filesystem::path& path, std::span<const Tensor
   });
 }
 
+void require_float(const SafeTensors& file, const TensorEntry& entry) {
+  switch (entry.type) {
+    case ElementType::kF16:
+    case ElementType::kBF16:
+    case ElementType::kF32:
+    case ElementType::kF64:
+      return;
+    default:
+      throw Error(ErrorCode::kUnsupported, file.path().string(),
+                  "tensor " + printable(entry.name, 80) + " holds " + std::string(name_of(entry.type)) +
+                      ", expected weights of F32, F16 or BF16");
+  }
+}
+
 }  // namespace patina::nn

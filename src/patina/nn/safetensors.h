@@ -77,6 +77,9 @@ class SafeTensors {
   std::map<std::string, std::string> metadata_;
 };
 
+/// Throws Error{kUnsupported} that names file, tensor and type unless its elements are F32, F16, BF16 or F64.
+void require_float(const SafeTensors& file, const TensorEntry& entry);
+
 /// Throws Error{kUnsupported} with the reason if the path's name is that of a pickled checkpoint (.ckpt .pth
 /// .pt .bin .pkl).
 void refuse_pickle_name(const std::filesystem::path& path);

@@ -50,13 +50,6 @@ std::string list_text(const std::vector<std::string>& items) {
 
 }  // namespace
 
-void require_float(const SafeTensors& file, const TensorEntry& entry) {
-  if (at::isFloatingType(scalar_type(file, entry))) return;
-  throw Error(ErrorCode::kUnsupported, file.path().string(),
-              "tensor " + printable(entry.name, 80) + " holds " + std::string(name_of(entry.type)) +
-                  ", expected weights of F32, F16 or BF16");
-}
-
 at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::ScalarType type) {
   const at::ScalarType stored = scalar_type(file, entry);
   if (at::isFloatingType(type)) require_float(file, entry);

@@ -14,10 +14,8 @@ namespace patina::nn {
 
 /// The tensor as the file holds it. Where dtype and alignment allow it lies in the map, without a copy, and
 /// keeps the map alive; else it is one conversion. Throws Error{kUnsupported} for elements that are no F32,
-/// F16, BF16 or F64 if `type` is a floating type; otherwise integers become `type` too.
+/// F16, BF16 or F64 if `type` is a floating type (require_float); otherwise integers become `type` too.
 at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::ScalarType type);
-/// Throws as read_tensor does for weights, without reading.
-void require_float(const SafeTensors& file, const TensorEntry& entry);
 
 /// Where the tensors of a network come from.
 class WeightSource {

@@ -29,7 +29,7 @@ std::vector<fs::path> find_files(const EditSettings& settings) {
         "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
         "2.x; `patina models DIR` lists those in a folder");
   diffusion::check_device(settings.device, settings.dtype);
-  diffusion::check_model(settings.model);
+  diffusion::check_model(settings.model, settings.options.scheduler);
   return diffusion::model_files(settings.model);
 }
 

@@ -139,17 +139,16 @@ void check_tokenizer(const fs::path& file, Parts& parts, Comparison& comparison)
 void check_text_encoder(const Stored& stored, Parts& parts, Comparison& comparison) {
   Activations activations;
   const at::Tensor ids = stored["input_ids"];
-  const TextEncoding encoding = parts.text_encoder()(ids, 1, activations.recorder());
+  const TextConditioning encoding = parts.text_encoder()(ids, 1, activations.recorder());
   if (stored.has("last_hidden_state")) {
-    comparison.add("last_hidden_state", encoding.last_hidden_state, stored["last_hidden_state"],
-                   kModuleLimit);
+    comparison.add("last_hidden_state", encoding.tokens, stored["last_hidden_state"], kModuleLimit);
   }
   if (stored.has("pooler_output"))
     comparison.add("pooler_output", encoding.pooled, stored["pooler_output"], kModuleLimit);
   const std::string skip = "clip_skip_";
   for (const std::string& name : stored.names(skip)) {
     const int clip_skip = std::stoi(name.substr(skip.size()));
-    comparison.add(name, parts.text_encoder()(ids, clip_skip).last_hidden_state, stored[name], kModuleLimit);
+    comparison.add(name, parts.text_encoder()(ids, clip_skip).tokens, stored[name], kModuleLimit);
   }
   activations.compare(stored, comparison);
 }
@@ -189,13 +188,13 @@ void check_timestep_embedding(const Stored& stored, Parts&, Comparison& comparis
       expected, kEmbeddingLimit);
 }
 
-UNetInputs unet_inputs(const Stored& stored) {
-  return {stored["sample"], stored["timestep"], stored["encoder_hidden_states"]};
+NetworkInputs unet_inputs(const Stored& stored) {
+  return {stored["sample"], stored["timestep"], {stored["encoder_hidden_states"], {}}};
 }
 
 void check_unet(const Stored& stored, Parts& parts, Comparison& comparison) {
   Activations activations;
-  comparison.add("out", parts.unet()(unet_inputs(stored), activations.recorder()), stored["out"],
+  comparison.add("out", parts.unet()(unet_inputs(stored), {}, activations.recorder()), stored["out"],
                  kModuleLimit);
   activations.compare(stored, comparison);
 }
@@ -235,12 +234,12 @@ void check_unet_bias(const Stored& stored, Parts& parts, Comparison& comparison)
     return comparison.fail("some pairs_N belong to no level of the U-Net");
 
   Activations activations;
-  UNetInputs inputs = unet_inputs(stored);
+  NetworkInputs inputs = unet_inputs(stored);
   const nn::SelfAttentionBias bias{levels, stored["weight"].item<float>(), /*scaled_with_scores=*/true};
   if (stored.has("out_without_bias"))
     comparison.add("out_without_bias", parts.unet()(inputs), stored["out_without_bias"], kModuleLimit);
   inputs.bias = &bias;
-  comparison.add("out", parts.unet()(inputs, activations.recorder()), stored["out"], kModuleLimit);
+  comparison.add("out", parts.unet()(inputs, {}, activations.recorder()), stored["out"], kModuleLimit);
   activations.compare(stored, comparison);
 }
 
@@ -262,15 +261,14 @@ void check_controlnet(const Stored& stored, const std::string& which, Parts& par
   const nn::Recorder record = activations.recorder();
   const ControlNet& network = *parts.controlnet(which).use();
   const float scale = stored.has("conditioning_scale") ? stored["conditioning_scale"].item<float>() : 1.0f;
-  const UNetInputs inputs = unet_inputs(stored);
+  const NetworkInputs inputs = unet_inputs(stored);
   const at::Tensor hint = network.hint(stored["controlnet_cond"], record);
-  compare_residuals(network(inputs.sample, inputs.timesteps, inputs.text, hint, scale, record), "", stored,
-                    comparison);
+  compare_residuals(network(inputs, hint, scale, record), "", stored, comparison);
   activations.compare(stored, comparison);
 }
 
 void check_unet_controlnets(const Stored& stored, Parts& parts, Comparison& comparison) {
-  UNetInputs inputs = unet_inputs(stored);
+  const NetworkInputs inputs = unet_inputs(stored);
   if (stored.has("out_without_control")) {
     comparison.add("out_without_control", parts.unet()(inputs), stored["out_without_control"], kModuleLimit);
   }
@@ -280,12 +278,10 @@ void check_unet_controlnets(const Stored& stored, Parts& parts, Comparison& comp
   for (const std::string name : {"tile", "normal"}) {
     const ControlNet& network = *parts.controlnet(name).use();
     residuals = sum(std::move(residuals),
-                    network(inputs.sample, inputs.timesteps, inputs.text,
-                            network.hint(stored["cond_" + name]), scales[index++].item<float>()));
+                    network(inputs, network.hint(stored["cond_" + name]), scales[index++].item<float>()));
   }
   compare_residuals(residuals, "sum_", stored, comparison);
-  inputs.control = residuals;
-  comparison.add("out", parts.unet()(inputs), stored["out"], kModuleLimit);
+  comparison.add("out", parts.unet()(inputs, residuals), stored["out"], kModuleLimit);
 }
 
 /// Finds out what a file is and checks it; false if it is of no known kind.

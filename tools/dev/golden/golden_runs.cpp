@@ -1,4 +1,5 @@
 // The golden cases that go step by step: scheduler trajectories with given network outputs, and whole runs.
+#include <array>
 #include <cmath>
 #include <sstream>
 
@@ -65,7 +66,7 @@ void check_run(const Stored& stored, Parts& parts, const SchedulePlan& plan, int
   comparison.add("timesteps", tensor_of(plan.timesteps, static_cast<size_t>(start)), stored["timesteps"],
                  kModuleLimit);
   const auto encode = [&](const std::string& which, const std::string& text) {
-    const at::Tensor embedding = encode_prompts(parts.tokenizer(), parts.text_encoder(), {}, {{text}});
+    const TextConditioning embedding = encode_prompts(parts.tokenizer(), parts.text_encoder(), {}, {{text}});
     if (stored.has("input_ids_" + which)) {
       const at::Tensor ids = stored["input_ids_" + which];
       const std::vector<int64_t> found =
@@ -73,13 +74,13 @@ void check_run(const Stored& stored, Parts& parts, const SchedulePlan& plan, int
       comparison.add("input_ids_" + which, at::tensor(found, at::kLong).unsqueeze(0), ids, {0, 0});
     }
     const std::string name = "encoder_hidden_states_" + which;
-    if (stored.has(name)) comparison.add(name, embedding, stored[name], kModuleLimit);
+    if (stored.has(name)) comparison.add(name, embedding.tokens, stored[name], kModuleLimit);
     return embedding;
   };
   const float guidance_scale = std::stof(stored.metadata("guidance_scale"));
-  at::Tensor text = encode("prompt", stored.metadata("prompt"));
-  const at::Tensor negative = encode("negative", stored.metadata("negative_prompt"));
-  if (guidance_scale != 1) text = at::cat({negative, text});
+  TextConditioning text = encode("prompt", stored.metadata("prompt"));
+  const TextConditioning negative = encode("negative", stored.metadata("negative_prompt"));
+  if (guidance_scale != 1) text = stack_prompts(std::array{negative, text});
 
   const at::Tensor latents = stored["latents"];
   const int64_t num_calls = plan.num_calls() - start;

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "patina/diffusion/files/weight_files.h"
@@ -20,5 +21,11 @@ struct LearnedWord {
 /// The words of one file; a file of one word answers to its own name too. `width` is that of the text
 /// encoder. Throws Error naming file and tensor, expected and found.
 std::vector<LearnedWord> read_embedding(const std::filesystem::path& path, int64_t width);
+
+/// How names of tensors begin that kohya's trainer puts into a LoRA beside its own, with the words that were
+/// trained together with it: "bundle_emb.<word>.string_to_param.*".
+inline constexpr std::string_view kBundledEmbedding = "bundle_emb.";
+/// The words that a LoRA brings along, most often none. Throws as read_embedding.
+std::vector<LearnedWord> read_bundled_words(const std::filesystem::path& path, int64_t width);
 
 }  // namespace patina::diffusion

@@ -3,14 +3,14 @@
 #include <algorithm>
 
 #include "patina/base/error.h"
+#include "patina/diffusion/files/families.h"
+#include "patina/diffusion/files/unet_blocks.h"
 
 namespace patina::diffusion {
 namespace {
 
-constexpr int64_t kNumGroups = 32;       // of every group norm
-constexpr int64_t kNumHeadsSd1 = 8;      // at every level of SD 1.x
-constexpr int64_t kHeadWidth = 64;       // of SD 2.x and of CLIP's text encoders
-constexpr int64_t kSd2TextWidth = 1024;  // of OpenCLIP's ViT-H, the one text encoder that has plain GELU
+constexpr int64_t kNumGroups = 32;      // of every group norm
+constexpr int64_t kClipHeadWidth = 64;  // of CLIP's text encoders, all of them
 
 /// How many of "<prefix>0.", "<prefix>1.", … there are.
 int64_t count(const TensorTable& table, const std::string& prefix) {
@@ -26,9 +26,8 @@ int64_t count(const TensorTable& table, const std::string& prefix) {
 void check_channels(const TensorTable& table, int64_t channels, int64_t divisor, const std::string& of_what) {
   if (channels <= 0 || channels % divisor != 0)
     unsupported(table, "its " + std::string(name_of(table.network)) + " has " + std::to_string(channels) +
-                           " channels, which cannot be divided into " + of_what +
-                           " as in Stable Diffusion 1.x and 2.x; a config.json beside it could tell other "
-                           "sizes");
+                           " channels, which cannot be divided into " + of_what + " as in " + kFamilyNames +
+                           "; a config.json beside it could tell other sizes");
 }
 
 /// The way down and the middle: what U-Nets and ControlNets share.
@@ -42,10 +41,12 @@ UNetConfig infer_encoder(const TensorTable& table) {
   config.use_linear_projection = proj_in != table.tensors.end() && proj_in->second.entry.shape.size() == 2;
   const int64_t text_width = size_of(table, middle + "transformer_blocks.0.attn2.to_k.weight", 1);
 
-  const int64_t num_levels = count(table, "down_blocks.");
+  const FamilyTraits& family = traits_of(family_of(config));
+
+  const auto num_levels = static_cast<size_t>(count(table, "down_blocks."));
   if (num_levels == 0) size_of(table, "down_blocks.0.resnets.0.conv1.bias", 0);  // throws: there is none
-  for (int64_t i = 0; i < num_levels; ++i) {
-    const std::string down = "down_blocks." + std::to_string(i) + ".";
+  for (size_t i = 0; i < num_levels; ++i) {
+    const std::string down = down_block_name(i) + ".";
     LevelConfig level;
     level.num_layers = count(table, down + "resnets.");
     level.channels = size_of(table, down + "resnets.0.conv1.bias", 0);
@@ -54,14 +55,12 @@ UNetConfig infer_encoder(const TensorTable& table) {
     level.num_transformer_layers = level.down_attention
                                        ? count(table, down + "attentions.0.transformer_blocks.")
                                        : count(table, middle + "transformer_blocks.");
-    level.up_attention = table.has_prefix("up_blocks." + std::to_string(num_levels - 1 - i) + ".attentions.");
+    level.up_attention = table.has_prefix(up_block_name(i, num_levels) + ".attentions.");
     check_channels(table, level.channels, kNumGroups, "32 groups");
-    if (config.use_linear_projection) {
-      check_channels(table, level.channels, kHeadWidth, "heads of 64");
-      level.num_heads = level.channels / kHeadWidth;
-    } else {
-      level.num_heads = kNumHeadsSd1;
-    }
+    if (family.head_width > 0)
+      check_channels(table, level.channels, family.head_width,
+                     "heads of " + std::to_string(family.head_width));
+    level.num_heads = family.head_width > 0 ? level.channels / family.head_width : family.num_heads;
     config.levels.push_back(level);
   }
   return config;
@@ -95,9 +94,11 @@ VaeConfig infer_vae_config(const TensorTable& table) {
   config.out_channels = size_of(table, "decoder.conv_out.weight", 0);
   config.latent_channels = size_of(table, "decoder.conv_in.weight", 1);
   if (config.latent_channels == 16)
-    unsupported(table,
-                "is a VAE with 16 latent channels, as Stable Diffusion 3 and Flux have; expected 4 as "
-                "in Stable Diffusion 1.x and 2.x");
+    unsupported(
+        table,
+        std::string("is a VAE with 16 latent channels, as Stable Diffusion 3 and Flux have; expected 4 as "
+                    "in ") +
+            kFamilyNames);
   const int64_t num_levels = count(table, "encoder.down_blocks.");
   for (int64_t i = 0; i < std::max<int64_t>(num_levels, 1); ++i) {
     config.block_out_channels.push_back(
@@ -119,21 +120,12 @@ TextEncoderConfig infer_text_encoder_config(const TensorTable& table) {
   config.max_positions = size_of(table, embeddings + "position_embedding.weight", 0);
   config.num_layers = count(table, layers);
   config.intermediate_size = size_of(table, layers + "0.mlp.fc1.weight", 0);
-  check_channels(table, config.hidden_size, kHeadWidth, "heads of 64");
-  config.num_heads = config.hidden_size / kHeadWidth;
+  check_channels(table, config.hidden_size, kClipHeadWidth, "heads of 64");
+  config.num_heads = config.hidden_size / kClipHeadWidth;
   // The end token is the last one of CLIP's vocabulary.
   config.eos_token_id = config.vocab_size - 1;
-  const bool openclip = table.naming == Naming::kOpenClip || config.hidden_size == kSd2TextWidth;
-  config.activation = openclip ? TextActivation::kGelu : TextActivation::kQuickGelu;
+  config.activation = traits_of(family_of_text_encoder(table.naming, config.hidden_size)).activation;
   return config;
-}
-
-Family family_of(const UNetConfig& config) {
-  return config.use_linear_projection ? Family::kSd2 : Family::kSd1;
-}
-
-const char* name_of(Family family) {
-  return family == Family::kSd2 ? "Stable Diffusion 2.x" : "Stable Diffusion 1.x";
 }
 
 }  // namespace patina::diffusion

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "patina/base/check.h"
+#include "patina/diffusion/files/unet_blocks.h"
 
 namespace patina::diffusion {
 namespace {
@@ -31,25 +32,25 @@ void add_resnet(NameMap& names, const std::string& ldm, const std::string& diffu
   names.add(ldm + ".skip_connection", diffusers + ".conv_shortcut");
 }
 
-/// From the latents to the middle: what U-Nets and ControlNets share.
+/// From the latents to the middle: what U-Nets and ControlNets share. LDM counts every layer and every
+/// downsampler as a block of its own.
 void add_encoder(NameMap& names, const std::vector<LevelConfig>& levels) {
   names.add("time_embed.0", "time_embedding.linear_1");
   names.add("time_embed.2", "time_embedding.linear_2");
   names.add("input_blocks.0.0", "conv_in");
-  int64_t block = 1;
-  for (size_t i = 0; i < levels.size(); ++i) {
-    const std::string level = join("down_blocks", static_cast<int64_t>(i));
-    for (int64_t layer = 0; layer < levels[i].num_layers; ++layer, ++block) {
-      add_resnet(names, join("input_blocks", block, ".0"), join(level + ".resnets", layer));
-      if (levels[i].down_attention)
-        names.add(join("input_blocks", block, ".1"), join(level + ".attentions", layer));
+  int64_t number = 1;
+  for (const UNetBlock& block : down_blocks(levels)) {
+    for (const UNetLayer& layer : block.layers) {
+      add_resnet(names, join("input_blocks", number, ".0"), layer.resnet);
+      if (layer.transformer) names.add(join("input_blocks", number, ".1"), *layer.transformer);
+      ++number;
     }
-    if (i + 1 < levels.size())
-      names.add(join("input_blocks", block++, ".0.op"), level + ".downsamplers.0.conv");
+    if (block.resampler) names.add(join("input_blocks", number++, ".0.op"), *block.resampler + ".conv");
   }
-  add_resnet(names, "middle_block.0", "mid_block.resnets.0");
-  names.add("middle_block.1", "mid_block.attentions.0");
-  add_resnet(names, "middle_block.2", "mid_block.resnets.1");
+  const UNetBlock middle = mid_block(levels);
+  add_resnet(names, "middle_block.0", middle.layers[0].resnet);
+  names.add("middle_block.1", middle.layers[0].transformer.value());
+  add_resnet(names, "middle_block.2", middle.layers[1].resnet);
 }
 
 void add_vae_resnet(NameMap& names, const std::string& ldm, const std::string& diffusers) {
@@ -90,18 +91,17 @@ std::optional<std::string> NameMap::to_ldm(std::string_view diffusers) const {
 NameMap unet_names(const std::vector<LevelConfig>& levels) {
   NameMap names;
   add_encoder(names, levels);
-  int64_t block = 0;
-  for (size_t i = 0; i < levels.size(); ++i) {
-    const LevelConfig& level = levels[levels.size() - 1 - i];
-    const std::string up = join("up_blocks", static_cast<int64_t>(i));
-    for (int64_t layer = 0; layer <= level.num_layers; ++layer, ++block) {
-      add_resnet(names, join("output_blocks", block, ".0"), join(up + ".resnets", layer));
-      if (level.up_attention) names.add(join("output_blocks", block, ".1"), join(up + ".attentions", layer));
+  int64_t number = 0;
+  for (const UNetBlock& block : up_blocks(levels)) {
+    for (const UNetLayer& layer : block.layers) {
+      add_resnet(names, join("output_blocks", number, ".0"), layer.resnet);
+      if (layer.transformer) names.add(join("output_blocks", number, ".1"), *layer.transformer);
+      ++number;
     }
     // The upsampler stands in the level's last block, behind the attention where there is one.
-    if (i + 1 < levels.size())
-      names.add(join("output_blocks", block - 1, level.up_attention ? ".2.conv" : ".1.conv"),
-                up + ".upsamplers.0.conv");
+    if (block.resampler)
+      names.add(join("output_blocks", number - 1, block.layers.back().transformer ? ".2.conv" : ".1.conv"),
+                *block.resampler + ".conv");
   }
   names.add("out.0", "conv_norm_out");
   names.add("out.2", "conv_out");
@@ -118,10 +118,9 @@ NameMap controlnet_names(const std::vector<LevelConfig>& levels, int64_t num_emb
   for (int64_t i = 0; i < num_blocks; ++i)
     names.add(join("input_hint_block", 2 * (i + 1)), join(embedding + ".blocks", i));
   names.add(join("input_hint_block", 2 * (num_blocks + 1)), embedding + ".conv_out");
-  // One convolution behind every block of the encoder.
-  int64_t num_blocks_down = static_cast<int64_t>(levels.size());
-  for (const LevelConfig& level : levels) num_blocks_down += level.num_layers;
-  for (int64_t i = 0; i < num_blocks_down; ++i)
+  // One convolution behind every kept output of the encoder.
+  const auto num_kept = static_cast<int64_t>(skip_channels(levels).size());
+  for (int64_t i = 0; i < num_kept; ++i)
     names.add(join("zero_convs", i, ".0"), join("controlnet_down_blocks", i));
   names.add("middle_block_out.0", "controlnet_mid_block");
   return names;

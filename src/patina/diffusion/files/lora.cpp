@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "patina/base/error.h"
+#include "patina/diffusion/files/embedding.h"
 #include "patina/diffusion/files/recognise.h"
 
 namespace patina::diffusion {
@@ -119,6 +120,7 @@ double scalar(const StoredTensor& tensor) {
 std::map<std::string, Module> modules_of(const WeightFiles& files) {
   std::map<std::string, Module> modules;
   for (const auto& [name, tensor] : files.tensors) {
+    if (name.starts_with(kBundledEmbedding)) continue;  // a learned word, see embedding.h
     const auto suffix = std::find_if(kSuffixes.begin(), kSuffixes.end(),
                                      [&](const Suffix& s) { return name.ends_with(s.text); });
     if (suffix == kSuffixes.end())
@@ -183,42 +185,61 @@ std::optional<double> metadata_scale(const WeightFiles& files, const std::string
   return std::nullopt;
 }
 
-void match_lora(LoraSet& set, const LoraChoice& choice, const UNetPart& unet, const FlatNames& unet_names,
-                const TextEncoderPart& text, const FlatNames& text_names) {
+/// A network that a LoRA may change.
+struct Target {
+  const TensorTable* table;
+  FlatNames names;
+  std::vector<std::string> prefixes;  // of its modules' flat names
+  std::string metadata;               // its name in the metadata of diffusers' files
+};
+
+/// The weight that a module changes.
+struct Match {
+  size_t target;     // index of its network
+  std::string name;  // by diffusers
+  const StoredTensor* weight;
+};
+std::optional<Match> find_module(const std::vector<Target>& targets, const std::string& path) {
+  // Old files of diffusers name modules of the U-Net without a prefix.
+  for (const bool bare : {false, true}) {
+    for (size_t i = 0; i < targets.size(); ++i) {
+      const Target& target = targets[i];
+      for (const std::string& prefix : bare ? std::vector<std::string>{""} : target.prefixes) {
+        if (!path.starts_with(prefix)) continue;
+        const auto name = target.names.find(path.substr(prefix.size()));
+        if (name == target.names.end()) continue;
+        return Match{i, name->second, &target.table->tensors.find(name->second)->second};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+/// Adds the file's products to `deltas`, one map a target.
+void match_lora(std::vector<LoraDeltas>& deltas, const LoraChoice& choice,
+                const std::vector<Target>& targets) {
   const WeightFiles files = open_weight_files(choice.file);
   require_kind(files, FileKind::kLora);
-  const std::optional<double> unet_scale = metadata_scale(files, "unet"),
-                              text_scale = metadata_scale(files, "text_encoder");
-  struct Place {
-    const char* prefix;
-    bool in_unet;
-  };
-  // Old files of diffusers name modules of the U-Net without a prefix.
-  constexpr std::array kPlaces{Place{"lora_unet_", true},     Place{"lora_te_", false}, Place{"unet_", true},
-                               Place{"text_encoder_", false}, Place{"", true},          Place{"", false}};
+  std::vector<std::optional<double>> scales;
+  for (const Target& target : targets) scales.push_back(metadata_scale(files, target.metadata));
   std::vector<std::string> strangers;
   for (const auto& [path, module] : modules_of(files)) {
-    bool placed = false;
-    for (const Place& place : kPlaces) {
-      if (placed || !path.starts_with(place.prefix)) continue;
-      const FlatNames& names = place.in_unet ? unet_names : text_names;
-      const auto name = names.find(path.substr(std::string_view(place.prefix).size()));
-      if (name == names.end()) continue;
-      placed = true;
-      if (!module.down || !module.up)
-        throw Error(ErrorCode::kFormat, files.where.string(),
-                    "tensor '" + printable(module.first_tensor, 100) +
-                        "' has no counterpart; expected both " +
-                        "lora_down and lora_up (or lora_A and lora_B)");
-      const TensorTable& table = place.in_unet ? unet.table : text.table;
-      check_shapes(files, module, table.tensors.find(name->second)->second);
-      const double rank = static_cast<double>(module.down->entry.shape[0]);
-      const double scale = module.alpha ? scalar(*module.alpha) / rank
-                                        : (place.in_unet ? unet_scale : text_scale).value_or(1.0);
-      (place.in_unet ? set.unet : set.text_encoder)[name->second].push_back(
-          {*module.down, *module.up, module.mid, static_cast<double>(choice.weight) * scale});
+    const std::optional<Match> match = find_module(targets, path);
+    if (!match) {
+      strangers.push_back(printable(module.first_tensor, 100));
+      continue;
     }
-    if (!placed) strangers.push_back(printable(module.first_tensor, 100));
+    if (!module.down || !module.up)
+      throw Error(ErrorCode::kFormat, files.where.string(),
+                  "tensor '" + printable(module.first_tensor, 100) +
+                      "' has no counterpart; expected both lora_down and lora_up (or lora_A and lora_B)");
+    for (const std::optional<StoredTensor>* part : {&module.down, &module.up, &module.mid})
+      if (*part) nn::require_float(*(*part)->file, (*part)->entry);
+    check_shapes(files, module, *match->weight);
+    const double rank = static_cast<double>(module.down->entry.shape[0]);
+    const double scale = module.alpha ? scalar(*module.alpha) / rank : scales[match->target].value_or(1.0);
+    deltas[match->target][match->name].push_back(
+        {*module.down, *module.up, module.mid, static_cast<double>(choice.weight) * scale});
   }
   if (!strangers.empty()) {
     throw Error(ErrorCode::kFormat, files.where.string(),
@@ -226,17 +247,33 @@ void match_lora(LoraSet& set, const LoraChoice& choice, const UNetPart& unet, co
                     " modules that this model does not have, such as that of " + strangers.front() +
                     "; the LoRA was made for another family of models");
   }
-  set.files.push_back(choice.file);
 }
 
 }  // namespace
 
-LoraSet match_loras(std::span<const LoraChoice> choices, const UNetPart& unet, const TextEncoderPart& text) {
+LoraSet match_loras(std::span<const LoraChoice> choices, const UNetPart& unet,
+                    std::span<const TensorTable* const> text_encoders) {
   LoraSet set;
+  set.text_encoders.resize(text_encoders.size());
   if (choices.empty()) return set;
-  const FlatNames in_unet = flat_names(unet.table, unet_names(unet.config.levels));
-  const FlatNames in_text = flat_names(text.table, {});
-  for (const LoraChoice& choice : choices) match_lora(set, choice, unet, in_unet, text, in_text);
+  std::vector<Target> targets{{&unet.table,
+                               flat_names(unet.table, unet_names(unet.config.levels)),
+                               {"lora_unet_", "unet_", "diffusion_model_"},
+                               "unet"}};
+  for (size_t i = 0; i < text_encoders.size(); ++i) {
+    // diffusers counts from the second on, and kohya with it.
+    const std::string number = i == 0 ? "" : std::to_string(i + 1),
+                      name = i == 0 ? "text_encoder" : "text_encoder_" + number;
+    targets.push_back(
+        {text_encoders[i], flat_names(*text_encoders[i], {}), {"lora_te" + number + "_", name + "_"}, name});
+  }
+  std::vector<LoraDeltas> deltas(targets.size());
+  for (const LoraChoice& choice : choices) {
+    match_lora(deltas, choice, targets);
+    set.files.push_back(choice.file);
+  }
+  set.unet = std::move(deltas.front());
+  std::move(deltas.begin() + 1, deltas.end(), set.text_encoders.begin());
   return set;
 }
 

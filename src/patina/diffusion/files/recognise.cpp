@@ -4,6 +4,7 @@
 #include <array>
 
 #include "patina/base/error.h"
+#include "patina/diffusion/files/families.h"
 
 namespace patina::diffusion {
 namespace {
@@ -110,7 +111,7 @@ FileKind kind_of(const WeightFiles& files) {
 }
 
 std::string refused(const std::string& what) {
-  return "is " + what + "; patina runs Stable Diffusion 1.x and 2.x";
+  return "is " + what + "; patina runs " + kFamilyNames;
 }
 
 }  // namespace
@@ -149,11 +150,9 @@ Recognised recognise(const WeightFiles& files) {
   }
   const FileKind kind = kind_of(files);
   if (kind == FileKind::kOther)
-    return {kind,
-            "holds no network that patina knows (its first tensor is '" +
-                (files.tensors.empty() ? "" : printable(files.tensors.begin()->first, 80)) +
-                "'); expected a checkpoint, ControlNet, VAE, LoRA or embedding of Stable Diffusion 1.x or "
-                "2.x"};
+    return {kind, "holds no network that patina knows (its first tensor is '" +
+                      (files.tensors.empty() ? "" : printable(files.tensors.begin()->first, 80)) +
+                      "'); expected a checkpoint, ControlNet, VAE, LoRA or embedding of " + kFamilyNames};
   return {kind, ""};
 }
 

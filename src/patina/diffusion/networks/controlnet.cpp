@@ -3,6 +3,7 @@
 #include <ATen/ATen.h>
 
 #include "patina/base/check.h"
+#include "patina/diffusion/files/unet_blocks.h"
 #include "patina/diffusion/networks/component.h"
 
 namespace patina::diffusion {
@@ -39,7 +40,7 @@ ControlNet::ControlNet(const ControlNetConfig& config, nn::WeightReader& weights
     : type_(weights.type()), config_(config) {
   encoder_ = load_encoder(weights, config_.unet);
   condition_embedding_ = load_condition_embedding(weights, config_);
-  const std::vector<int64_t> channels = skip_channels(config_.unet);
+  const std::vector<int64_t> channels = skip_channels(config_.unet.levels);
   for (size_t i = 0; i < channels.size(); ++i) {
     const std::string name = "controlnet_down_blocks." + std::to_string(i);
     controlnet_down_blocks_.push_back(nn::load_conv2d(weights, name, channels[i], channels[i], 1));
@@ -60,14 +61,14 @@ at::Tensor ControlNet::hint(const at::Tensor& condition, const nn::Recorder& rec
       ordered.to(encoder_.conv_in.weight.device(), type_).contiguous(at::MemoryFormat::ChannelsLast), record);
 }
 
-ControlResiduals ControlNet::operator()(const at::Tensor& sample, const at::Tensor& timesteps,
-                                        const at::Tensor& text, const at::Tensor& hint, float scale,
-                                        const nn::Recorder& record, const nn::SelfAttentionBias* bias) const {
-  PATINA_CHECK_EQ(sample.dim(), 4);
-  PATINA_CHECK_EQ(sample.size(1), config_.unet.in_channels);
+ControlResiduals ControlNet::operator()(const NetworkInputs& inputs, const at::Tensor& hint, float scale,
+                                        const nn::Recorder& record) const {
+  PATINA_CHECK_EQ(inputs.sample.dim(), 4);
+  PATINA_CHECK_EQ(inputs.sample.size(1), config_.unet.in_channels);
   const c10::Device device = encoder_.conv_in.weight.device();
-  const at::Tensor x = sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
-  const Conditions conditions{encoder_.time(timesteps, record), text.to(device, type_), bias, record};
+  const at::Tensor x = inputs.sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
+  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.tokens.to(device, type_),
+                              inputs.bias, record};
   auto [skips, mid] = encoder_(encoder_.conv_in(x, record) + hint, conditions);
 
   ControlResiduals residuals;

@@ -26,11 +26,9 @@ class ControlNet {
   /// condition [B,3,8H,8W] RGB in [0,1] -> hint [B,C,H,W]. Does not depend on the timestep: once a run.
   at::Tensor hint(const at::Tensor& condition, const nn::Recorder& record = {}) const;
 
-  /// sample [B,C,H,W], timesteps [1] or [B], text [B,T,D], hint [1] or [B] -> residuals times `scale`. `bias`
-  /// acts on the self-attention as in the U-Net; null: none.
-  ControlResiduals operator()(const at::Tensor& sample, const at::Tensor& timesteps, const at::Tensor& text,
-                              const at::Tensor& hint, float scale, const nn::Recorder& record = {},
-                              const nn::SelfAttentionBias* bias = nullptr) const;
+  /// What to add to the U-Net of these inputs: residuals times `scale`. `hint` [1] or [B] as hint() makes it.
+  ControlResiduals operator()(const NetworkInputs& inputs, const at::Tensor& hint, float scale,
+                              const nn::Recorder& record = {}) const;
 
   const ControlNetConfig& config() const { return config_; }
   int64_t num_parameters() const { return count_.parameters; }

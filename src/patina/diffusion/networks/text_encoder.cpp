@@ -76,8 +76,8 @@ TextEncoder::TextEncoder(const TextEncoderConfig& config, nn::WeightReader& weig
 TextEncoder::TextEncoder(const std::filesystem::path& folder, at::ScalarType type)
     : TextEncoder(load_network<TextEncoder>(open_text_encoder(folder), type)) {}
 
-TextEncoding TextEncoder::operator()(const at::Tensor& token_ids, int64_t clip_skip,
-                                     const nn::Recorder& record, const at::Tensor& learned) const {
+TextConditioning TextEncoder::operator()(const at::Tensor& token_ids, int64_t clip_skip,
+                                         const nn::Recorder& record, const at::Tensor& learned) const {
   const at::Tensor ids = token_ids.to(token_embedding_.device());
   PATINA_CHECK_EQ(ids.dim(), 2);
   PATINA_CHECK_LE(ids.size(1), config_.max_positions);

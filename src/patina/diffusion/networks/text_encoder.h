@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "patina/diffusion/files/config.h"
+#include "patina/diffusion/networks/inputs.h"
 #include "patina/nn/layers.h"
 
 namespace patina::diffusion {
@@ -37,11 +38,6 @@ struct TextLayer {
   at::Tensor operator()(const at::Tensor& x, const nn::Recorder& record) const;
 };
 
-struct TextEncoding {
-  at::Tensor last_hidden_state;  // [B,T,D] after the final norm
-  at::Tensor pooled;             // [B,D] that at the end token
-};
-
 class TextEncoder {
  public:
   /// Takes its tensors from `weights`; what does not fit, weights.finish() tells.
@@ -49,10 +45,11 @@ class TextEncoder {
   /// Reads <folder>/config.json and the weights beside it, as `type`. Throws Error.
   TextEncoder(const std::filesystem::path& folder, at::ScalarType type);
 
-  /// ids [B,T] int64, T <= max_positions. `clip_skip` 1 runs all layers; n leaves out the last n - 1 before
+  /// ids [B,T] int64, T <= max_positions -> tokens [B,T,D] after the final norm, and [B,D] of them at the
+  /// first end token. `clip_skip` 1 runs all layers; n leaves out the last n - 1 before
   /// the final norm. `learned` [n,D], may be undefined, holds the vectors of the ids beyond the vocabulary.
-  TextEncoding operator()(const at::Tensor& ids, int64_t clip_skip = 1, const nn::Recorder& record = {},
-                          const at::Tensor& learned = {}) const;
+  TextConditioning operator()(const at::Tensor& ids, int64_t clip_skip = 1, const nn::Recorder& record = {},
+                              const at::Tensor& learned = {}) const;
 
   const TextEncoderConfig& config() const { return config_; }
   int64_t num_parameters() const { return count_.parameters; }

@@ -5,6 +5,7 @@
 #include <ATen/ATen.h>
 
 #include "patina/base/check.h"
+#include "patina/diffusion/files/unet_blocks.h"
 #include "patina/diffusion/networks/component.h"
 
 namespace patina::diffusion {
@@ -16,60 +17,47 @@ int64_t time_width(const UNetConfig& config) {
   return kTimeFactor * config.levels.front().channels;
 }
 
-ResnetBlock load_unet_resnet(nn::WeightReader& weights, const std::string& name, int64_t in, int64_t out,
-                             const UNetConfig& config) {
-  return load_resnet(weights, name, in, out, time_width(config), config.norm_num_groups, config.norm_epsilon);
+ResnetBlock load_unet_resnet(nn::WeightReader& weights, const UNetLayer& layer, const UNetConfig& config) {
+  return load_resnet(weights, layer.resnet, layer.in_channels + layer.skip_channels, layer.out_channels,
+                     time_width(config), config.norm_num_groups, config.norm_epsilon);
 }
 
-DownBlock load_down_block(nn::WeightReader& weights, size_t index, const UNetConfig& config) {
-  const LevelConfig& level = config.levels[index];
-  DownBlock block;
-  block.name = "down_blocks." + std::to_string(index);
-  int64_t in = config.levels[index > 0 ? index - 1 : 0].channels;
-  for (int64_t i = 0; i < level.num_layers; ++i) {
-    const std::string number = std::to_string(i);
-    block.resnets.push_back(
-        load_unet_resnet(weights, block.name + ".resnets." + number, in, level.channels, config));
-    if (level.down_attention) {
+/// Residual blocks and transformers of a block on the way down or up.
+template <class Block>
+Block load_layers(nn::WeightReader& weights, const UNetBlock& plan, const UNetConfig& config) {
+  Block block;
+  block.name = plan.name;
+  for (const UNetLayer& layer : plan.layers) {
+    block.resnets.push_back(load_unet_resnet(weights, layer, config));
+    if (layer.transformer)
       block.attentions.push_back(
-          load_transformer(weights, block.name + ".attentions." + number, level, config));
-    }
-    in = level.channels;
-  }
-  if (index + 1 < config.levels.size()) {
-    const std::string name = block.name + ".downsamplers.0";
-    block.downsamplers_0 =
-        Downsample{name, nn::load_conv2d(weights, name + ".conv", in, in, 3, /*stride=*/2)};
+          load_transformer(weights, *layer.transformer, config.levels[plan.level], config));
   }
   return block;
 }
 
-/// up_blocks count from the coarsest level.
-UpBlock load_up_block(nn::WeightReader& weights, size_t index, const UNetConfig& config) {
-  const size_t level_index = config.levels.size() - 1 - index;
-  const LevelConfig& level = config.levels[level_index];
-  const int64_t below = config.levels[std::min(level_index + 1, config.levels.size() - 1)].channels;
-  const int64_t above = config.levels[level_index > 0 ? level_index - 1 : 0].channels;
-  UpBlock block;
-  block.name = "up_blocks." + std::to_string(index);
-  int64_t in = below;
-  for (int64_t i = 0; i <= level.num_layers; ++i) {
-    const std::string number = std::to_string(i);
-    // The last layer meets the output of the level above (its downsampler, or conv_in), the others this
-    // level's own.
-    const int64_t skip = i == level.num_layers ? above : level.channels;
-    block.resnets.push_back(
-        load_unet_resnet(weights, block.name + ".resnets." + number, in + skip, level.channels, config));
-    if (level.up_attention) {
-      block.attentions.push_back(
-          load_transformer(weights, block.name + ".attentions." + number, level, config));
-    }
-    in = level.channels;
-  }
-  if (level_index > 0) {
-    const std::string name = block.name + ".upsamplers.0";
-    block.upsamplers_0 = Upsample{name, nn::load_conv2d(weights, name + ".conv", in, in, 3)};
-  }
+DownBlock load_down_block(nn::WeightReader& weights, const UNetBlock& plan, const UNetConfig& config) {
+  auto block = load_layers<DownBlock>(weights, plan, config);
+  const int64_t channels = config.levels[plan.level].channels;
+  if (plan.resampler)
+    block.downsamplers_0 =
+        Downsample{*plan.resampler, nn::load_conv2d(weights, *plan.resampler + ".conv", channels, channels, 3,
+                                                    /*stride=*/2)};
+  return block;
+}
+
+MidBlock load_mid_block(nn::WeightReader& weights, const UNetBlock& plan, const UNetConfig& config) {
+  return {plan.name, load_unet_resnet(weights, plan.layers[0], config),
+          load_transformer(weights, plan.layers[0].transformer.value(), config.levels[plan.level], config),
+          load_unet_resnet(weights, plan.layers[1], config)};
+}
+
+UpBlock load_up_block(nn::WeightReader& weights, const UNetBlock& plan, const UNetConfig& config) {
+  auto block = load_layers<UpBlock>(weights, plan, config);
+  const int64_t channels = config.levels[plan.level].channels;
+  if (plan.resampler)
+    block.upsamplers_0 =
+        Upsample{*plan.resampler, nn::load_conv2d(weights, *plan.resampler + ".conv", channels, channels, 3)};
   return block;
 }
 
@@ -86,31 +74,16 @@ at::Tensor timestep_embedding(const at::Tensor& timesteps, int64_t width, bool f
   return width % 2 ? at::constant_pad_nd(embedding, {0, 1}) : embedding;
 }
 
-std::vector<int64_t> skip_channels(const UNetConfig& config) {
-  std::vector<int64_t> channels{config.levels.front().channels};
-  for (size_t i = 0; i < config.levels.size(); ++i) {
-    const bool downsampled = i + 1 < config.levels.size();
-    channels.insert(channels.end(), static_cast<size_t>(config.levels[i].num_layers) + (downsampled ? 1 : 0),
-                    config.levels[i].channels);
-  }
-  return channels;
-}
-
 Encoder load_encoder(nn::WeightReader& weights, const UNetConfig& config) {
   const int64_t finest = config.levels.front().channels, time = time_width(config);
-  const LevelConfig& coarsest = config.levels.back();
   Encoder encoder;
   encoder.config = config;
   encoder.conv_in = nn::load_conv2d(weights, "conv_in", config.in_channels, finest, config.conv_in_kernel);
   encoder.time_embedding = {nn::load_linear(weights, "time_embedding.linear_1", finest, time),
                             nn::load_linear(weights, "time_embedding.linear_2", time, time)};
-  for (size_t i = 0; i < config.levels.size(); ++i)
-    encoder.down_blocks.push_back(load_down_block(weights, i, config));
-  encoder.mid_block = {
-      "mid_block",
-      load_unet_resnet(weights, "mid_block.resnets.0", coarsest.channels, coarsest.channels, config),
-      load_transformer(weights, "mid_block.attentions.0", coarsest, config),
-      load_unet_resnet(weights, "mid_block.resnets.1", coarsest.channels, coarsest.channels, config)};
+  for (const UNetBlock& plan : down_blocks(config.levels))
+    encoder.down_blocks.push_back(load_down_block(weights, plan, config));
+  encoder.mid_block = load_mid_block(weights, mid_block(config.levels), config);
   return encoder;
 }
 
@@ -147,7 +120,8 @@ Encoder::Outputs Encoder::operator()(const at::Tensor& x, const Conditions& cond
 
 UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.type()) {
   encoder_ = load_encoder(weights, config);
-  for (size_t i = 0; i < config.levels.size(); ++i) up_blocks_.push_back(load_up_block(weights, i, config));
+  for (const UNetBlock& plan : up_blocks(config.levels))
+    up_blocks_.push_back(load_up_block(weights, plan, config));
   const int64_t finest = config.levels.front().channels;
   conv_norm_out_ =
       nn::load_group_norm(weights, "conv_norm_out", finest, config.norm_num_groups, config.norm_epsilon);
@@ -158,20 +132,20 @@ UNet::UNet(const UNetConfig& config, nn::WeightReader& weights) : type_(weights.
 UNet::UNet(const std::filesystem::path& folder, at::ScalarType type)
     : UNet(load_network<UNet>(open_unet(folder), type)) {}
 
-at::Tensor UNet::operator()(UNetInputs inputs, const nn::Recorder& record) const {
+at::Tensor UNet::operator()(const NetworkInputs& inputs, ControlResiduals control,
+                            const nn::Recorder& record) const {
   const UNetConfig& config = encoder_.config;
   PATINA_CHECK_EQ(inputs.sample.dim(), 4);
   PATINA_CHECK_EQ(inputs.sample.size(1), config.in_channels);
-  PATINA_CHECK_EQ(inputs.text.dim(), 3);
+  PATINA_CHECK_EQ(inputs.text.tokens.dim(), 3);
 
   // Down, keeping every layer's output; ControlNets add to what was kept.
   const c10::Device device = encoder_.conv_in.weight.device();
   at::Tensor sample = inputs.sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
   if (config.center_input_sample) sample = 2 * sample - 1;
-  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.to(device, type_),
+  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.tokens.to(device, type_),
                               inputs.bias, record};
   auto [skips, h] = encoder_(encoder_.conv_in(sample, record), conditions);
-  ControlResiduals& control = inputs.control;
   if (control.mid.defined()) {
     PATINA_CHECK_EQ(control.down.size(), skips.size());
     for (size_t i = 0; i < skips.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "patina/diffusion/networks/blocks.h"
+#include "patina/diffusion/networks/inputs.h"
 
 namespace patina::diffusion {
 
@@ -58,21 +59,11 @@ struct Encoder {
   Outputs operator()(const at::Tensor& x, const Conditions& conditions) const;
 };
 Encoder load_encoder(nn::WeightReader& weights, const UNetConfig& config);
-/// Channels of each kept output, finest first.
-std::vector<int64_t> skip_channels(const UNetConfig& config);
 
 /// What ControlNets add to the U-Net's kept outputs and to its middle; empty: nothing.
 struct ControlResiduals {
   std::vector<at::Tensor> down;
   at::Tensor mid;
-};
-
-struct UNetInputs {
-  at::Tensor sample;              // [B,C,H,W] scaled latents
-  at::Tensor timesteps;           // [1] or [B] f32
-  at::Tensor text;                // [B,T,D]
-  ControlResiduals control = {};  // may be empty
-  const nn::SelfAttentionBias* bias = nullptr;
 };
 
 class UNet {
@@ -83,9 +74,10 @@ class UNet {
   UNet(const std::filesystem::path& folder, at::ScalarType type);
 
   /// The predicted noise (or what the scheduler's prediction type says), [B,C,H,W], of the weights' type and
-  /// on their device, to which inputs go. Takes the inputs by value, since it lets go of each residual that
-  /// is used up: move them in where memory counts.
-  at::Tensor operator()(UNetInputs inputs, const nn::Recorder& record = {}) const;
+  /// on their device, to which inputs go. Takes what the ControlNets add by value, since it lets go of each
+  /// residual that is used up: move it in where memory counts.
+  at::Tensor operator()(const NetworkInputs& inputs, ControlResiduals control = {},
+                        const nn::Recorder& record = {}) const;
 
   const UNetConfig& config() const { return encoder_.config; }
   int64_t num_parameters() const { return count_.parameters; }

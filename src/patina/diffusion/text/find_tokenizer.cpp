@@ -55,7 +55,7 @@ fs::path find_tokenizer(const TokenizerSearch& search) {
   if (fs::is_directory(search.model)) {
     if (!fs::exists(search.model / "tokenizer" / "merges.txt"))
       throw Error(ErrorCode::kNotFound, (search.model / "tokenizer").string(),
-                  "holds no merges.txt; expected the model's tokenizer, or name one (--tokenizer DIR)");
+                  "holds no merges.txt; expected the model's tokenizer, or give the folder of another");
     return search.model / "tokenizer";
   }
   std::vector<fs::path> candidates{search.model.parent_path() / "tokenizer"};
@@ -71,15 +71,13 @@ fs::path find_tokenizer(const TokenizerSearch& search) {
   for (const fs::path& path : search_folders(trees).tokenizers) {
     if (fits(path, search.vocabulary_size)) return path;
   }
-  throw Error(ErrorCode::kNotFound, search.model.string(),
-              "is a single file, which holds no tokenizer, and none of " +
-                  std::to_string(search.vocabulary_size) +
-                  " tokens was found. Any copy of CLIP's serves (merges.txt, and vocab.json beside it): give "
-                  "the folder of "
-                  "ComfyUI (comfy/sd1_tokenizer), of Forge or of any diffusers model by --model-dir, or the "
-                  "tokenizer's own "
-                  "folder by --tokenizer, or put it into '" +
-                  (search.model.parent_path() / "tokenizer").string() + "'");
+  throw Error(
+      ErrorCode::kNotFound, search.model.string(),
+      "is a single file, which holds no tokenizer, and none of " + std::to_string(search.vocabulary_size) +
+          " tokens was found. Any copy of CLIP's serves (merges.txt, and vocab.json beside it): give "
+          "the folder of ComfyUI (comfy/sd1_tokenizer), of Forge or of any diffusers model as a model "
+          "folder, or the tokenizer's own folder as the tokenizer, or put it into '" +
+          (search.model.parent_path() / "tokenizer").string() + "'");
 }
 
 }  // namespace patina::diffusion

@@ -151,9 +151,9 @@ class Chunker {
 std::vector<PromptPart> parse_prompt(std::string_view prompt) {
   for (const char* network : {"<lora:", "<lyco:"}) {
     if (prompt.find(network) != std::string_view::npos)
-      throw Error(
-          ErrorCode::kUsage, "--prompt",
-          "holds " + std::string(network) + "…>; give a LoRA on the command line: --lora FILE:WEIGHT");
+      throw Error(ErrorCode::kUsage, "prompt",
+                  "holds " + std::string(network) +
+                      "…>; LoRAs are given beside the prompt, each as its file and weight");
   }
   std::vector<PromptPart> parts;
   std::vector<size_t> round, square;  // first part inside each open bracket

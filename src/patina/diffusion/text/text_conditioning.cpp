@@ -10,19 +10,20 @@
 namespace patina::diffusion {
 namespace {
 
-/// [1,T,D].
-at::Tensor encode_chunk(const TokenChunk& chunk, const TextEncoder& text_encoder, const LearnedWords& words,
-                        int64_t clip_skip) {
+/// Of one prompt; tokens are weighted, the pooled vector is not.
+TextConditioning encode_chunk(const TokenChunk& chunk, const TextEncoder& text_encoder,
+                              const LearnedWords& words, int64_t clip_skip) {
   const at::Tensor ids = at::tensor(chunk.ids, at::kLong).unsqueeze(0);
-  const at::Tensor encoding = text_encoder(ids, clip_skip, {}, words.vectors).last_hidden_state;
+  TextConditioning encoding = text_encoder(ids, clip_skip, {}, words.vectors);
   if (!chunk.is_weighted()) return encoding;
-  const at::Tensor plain = encoding.to(at::kFloat);
+  const at::Tensor plain = encoding.tokens.to(at::kFloat);
   const at::Tensor weighted =
       plain * at::tensor(chunk.weights, at::kFloat).to(plain.device()).view({1, -1, 1});
   const double mean = plain.mean().item<double>(), weighted_mean = weighted.mean().item<double>();
   // Weights of 0 throughout leave nothing to bring back.
   const double restore = weighted_mean != 0 ? mean / weighted_mean : 1.0;
-  return (weighted * restore).to(encoding.scalar_type());
+  encoding.tokens = (weighted * restore).to(encoding.tokens.scalar_type());
+  return encoding;
 }
 
 }  // namespace
@@ -46,9 +47,9 @@ LearnedWords load_words(std::span<const LearnedWord> words, const TextEncoderCon
   return loaded;
 }
 
-at::Tensor encode_prompts(const Tokenizer& tokenizer, const TextEncoder& text_encoder,
-                          const LearnedWords& words, std::span<const std::string> prompts,
-                          int64_t clip_skip) {
+TextConditioning encode_prompts(const Tokenizer& tokenizer, const TextEncoder& text_encoder,
+                                const LearnedWords& words, std::span<const std::string> prompts,
+                                int64_t clip_skip) {
   const TextEncoderConfig& config = text_encoder.config();
   if (clip_skip < 1 || clip_skip > config.num_layers)
     throw Error(ErrorCode::kUsage, "clip skip",
@@ -61,15 +62,19 @@ at::Tensor encode_prompts(const Tokenizer& tokenizer, const TextEncoder& text_en
     chunks.push_back(chunk_prompt(parse_prompt(prompt), tokenizer, words.words, length));
     num_chunks = std::max(num_chunks, chunks.back().size());
   }
-  std::vector<at::Tensor> encoded;
+  std::vector<TextConditioning> encoded;
   for (std::vector<TokenChunk>& of_prompt : chunks) {
     of_prompt.resize(num_chunks, empty_chunk(tokenizer, length));
-    std::vector<at::Tensor> parts;
-    for (const TokenChunk& chunk : of_prompt)
-      parts.push_back(encode_chunk(chunk, text_encoder, words, clip_skip));
-    encoded.push_back(at::cat(parts, 1));
+    std::vector<at::Tensor> tokens;
+    at::Tensor pooled;
+    for (const TokenChunk& chunk : of_prompt) {
+      const TextConditioning encoding = encode_chunk(chunk, text_encoder, words, clip_skip);
+      tokens.push_back(encoding.tokens);
+      if (!pooled.defined()) pooled = encoding.pooled;
+    }
+    encoded.push_back({at::cat(tokens, 1), pooled});
   }
-  return at::cat(encoded);
+  return stack_prompts(encoded);
 }
 
 }  // namespace patina::diffusion

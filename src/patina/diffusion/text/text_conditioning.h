@@ -21,10 +21,11 @@ struct LearnedWords {
 LearnedWords load_words(std::span<const LearnedWord> words, const TextEncoderConfig& config,
                         nn::Placement placement);
 
-/// All prompts with as many chunks as the longest has: [prompts, chunks · positions, D]. Weighted vectors are
-/// brought back to the mean that the chunk had without weights, as A1111 does. Throws Error{kUsage}.
-at::Tensor encode_prompts(const Tokenizer& tokenizer, const TextEncoder& text_encoder,
-                          const LearnedWords& words, std::span<const std::string> prompts,
-                          int64_t clip_skip = 1);
+/// All prompts with as many chunks as the longest has: tokens [prompts, chunks · positions, D], pooled
+/// [prompts, D] of the first chunk, without weights. Weighted vectors are brought back to the mean that the
+/// chunk had without weights, as A1111 does. Throws Error{kUsage}.
+TextConditioning encode_prompts(const Tokenizer& tokenizer, const TextEncoder& text_encoder,
+                                const LearnedWords& words, std::span<const std::string> prompts,
+                                int64_t clip_skip = 1);
 
 }  // namespace patina::diffusion
