@@ -71,7 +71,7 @@ bench-inverse: setup
 bench-unet: setup
 	@cmake --preset release -DPATINA_BUILD_BENCH=ON
 	@cmake --build build/release --parallel $(JOBS) --target bench_unet make_checkpoint
-	build/release/bench_unet --out build/bench/unet.json
+	OMP_WAIT_POLICY=passive build/release/bench_unet --out build/bench/unet.json
 	@if $(PEER_PYTHON) -c "import diffusers" 2> /dev/null; then $(PEER_PYTHON) bench/unet/diffusers_peer.py --report build/bench/unet.json; \
 	else echo "No diffusers beside this; how to have it:  python3 bench/unet/diffusers_peer.py --help"; fi
 	@if $(PEER_PYTHON) -c "import stable_diffusion_cpp" 2> /dev/null; then \

@@ -8,7 +8,7 @@
 #include "console.h"
 #include "options_cli.h"
 #include "patina/base/error.h"
-#include "patina/base/parallel.h"
+#include "patina/nn/threads.h"
 #include "patina/pipeline/ablate.h"
 #include "patina/pipeline/options.h"
 #include "point_cli.h"
@@ -114,7 +114,7 @@ void add_ablate(CLI::App& program) {
       options.view_counts =
           parsed("views", own->views, "views", [](const auto& c) { return c.inputs.orbit.num_views; });
 
-    set_num_threads(config.num_threads);
+    nn::set_num_threads(config.num_threads);
     Console console(given->style());
     const nlohmann::json result = pipeline::ablate(config, options, own->output, console.progress());
     console.finish();

@@ -5,7 +5,7 @@
 #include "console.h"
 #include "options_cli.h"
 #include "patina/base/error.h"
-#include "patina/base/parallel.h"
+#include "patina/nn/threads.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/options.h"
 
@@ -24,7 +24,7 @@ void add_enhance(CLI::App& program) {
     require_prompt(config);
     if (config.output.empty())
       throw Error(ErrorCode::kUsage, "output", "say where the result goes, e.g. -o rusty.glb");
-    set_num_threads(config.num_threads);
+    nn::set_num_threads(config.num_threads);
     Console console(given->style());
     pipeline::RunFolder run(pipeline::run_folder_path(config));
     pipeline::enhance(config, run, console.progress());

@@ -5,7 +5,7 @@
 #include "console.h"
 #include "options_cli.h"
 #include "patina/base/error.h"
-#include "patina/base/parallel.h"
+#include "patina/nn/threads.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/show_attention.h"
 #include "point_cli.h"
@@ -55,7 +55,7 @@ void add_show_attention(CLI::App& program) {
 
     const std::filesystem::path output = own->output;
     if (config.run.empty()) config.run = output.parent_path() / (output.stem().string() + ".patina-run");
-    set_num_threads(config.num_threads);
+    nn::set_num_threads(config.num_threads);
     Console console(given->style());
     pipeline::RunFolder run(config.run);
     const pipeline::ShownAttention shown = pipeline::show_attention(config, options, run, console.progress());

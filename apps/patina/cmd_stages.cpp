@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "console.h"
 #include "options_cli.h"
-#include "patina/base/parallel.h"
+#include "patina/nn/threads.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/options.h"
 
@@ -16,7 +16,7 @@ using Stage = void (*)(pipeline::Config, pipeline::RunFolder&, const pipeline::R
 
 // Runs one stage on the run folder of `config`; `made` is what it leaves there.
 void run_stage(const pipeline::Config& config, const GivenOptions& given, Stage stage, const char* made) {
-  set_num_threads(config.num_threads);
+  nn::set_num_threads(config.num_threads);
   Console console(given.style());
   pipeline::RunFolder run(pipeline::run_folder_path(config));
   stage(config, run, console.progress());

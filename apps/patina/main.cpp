@@ -14,8 +14,8 @@
 #include "commands.h"
 #include "console.h"
 #include "patina/base/error.h"
-#include "patina/nn/threads.h"
 #include "usage.h"
+#include "wait_policy.h"
 
 namespace {
 
@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
   // Only these commands run networks; the others start twice as fast without it.
   const std::string_view command = argc > 1 ? argv[1] : "";
   if (command == "enhance" || command == "detail" || command == "ablate" || command == "show-attention")
-    patina::nn::sleep_between_parallel_regions(argv);
+    patina::app::sleep_between_parallel_regions(argv);
   CLI::App program(
       "patina adds generated detail (rust, moss, wear, dust, age) to the material of an existing 3D asset.\n"
       "Mesh, UVs and file structure stay; base colour, normal and roughness textures change.\n\n"

@@ -22,7 +22,6 @@
 #include "device_memory.h"
 #include "make_checkpoint/configs.h"
 #include "patina/base/error.h"
-#include "patina/base/parallel.h"
 #include "patina/diffusion/edit_run.h"
 #include "patina/diffusion/networks/vae.h"
 #include "patina/diffusion/sampler.h"
@@ -152,7 +151,6 @@ int usage() {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  nn::sleep_between_parallel_regions(argv);
   std::string bias_file;
   int steps = 4;
   nn::Placement placement(at::kBFloat16);
@@ -173,7 +171,7 @@ int main(int argc, char** argv) try {
       return usage();
   }
   if (bias_file.empty()) return usage();
-  at::set_num_threads(num_threads());
+  nn::set_num_threads(0);
   std::printf("%s\n", measure(read_bias(bias_file), steps, placement).dump(1).c_str());
 } catch (const std::exception& error) {
   const std::string message = error.what();  // LibTorch's go on with a stack

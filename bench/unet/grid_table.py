@@ -13,6 +13,7 @@ after a first one that is not (it compiles and takes memory). A cell that fails 
 import argparse
 import json
 import math
+import os
 import subprocess
 import sys
 import tempfile
@@ -40,7 +41,9 @@ def write_bias(path, grid, view):
 
 def measured(command):
     """The JSON that `command` prints, with the seconds of a whole run, or {"failed": last line of its errors}."""
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+    # LibTorch's waiting threads sleep: spinning ones take the processors from the attention kernels.
+    environment = {"OMP_WAIT_POLICY": "passive"} | os.environ
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, env=environment)
     if done.returncode:
         lines = done.stderr.strip().splitlines()
         return {"failed": lines[-1][:300] if lines else f"exit status {done.returncode}"}

@@ -19,7 +19,6 @@
 #include "operation_times.h"
 #include "patina/base/files.h"
 #include "patina/base/memory.h"
-#include "patina/base/parallel.h"
 #include "patina/diffusion/networks/unet.h"
 #include "patina/diffusion/networks/vae.h"
 #include "patina/nn/threads.h"
@@ -137,8 +136,8 @@ nlohmann::json measure(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  nn::sleep_between_parallel_regions(argv);
   Options options;
+  int threads = 0;  // all processors
   for (int i = 1; i < argc; ++i) {
     const std::string flag = argv[i];
     const auto number = [&] { return i + 1 < argc ? std::atoi(argv[++i]) : 0; };
@@ -149,7 +148,7 @@ int main(int argc, char** argv) {
     else if (flag == "--repeat")
       options.repeat = std::max(1, number());
     else if (flag == "--threads")
-      set_num_threads(number());
+      threads = number();
     else if (flag == "--f32")
       options.type = at::kFloat;
     else if (flag == "--out" && i + 1 < argc)
@@ -161,8 +160,7 @@ int main(int argc, char** argv) {
       return 2;
     }
   }
-  // As diffusion::Model does: left to itself LibTorch may take fewer threads than there are processors.
-  at::set_num_threads(num_threads());
+  nn::set_num_threads(threads);
   const nlohmann::json result = measure(options);
   std::printf("%s\n", result.dump(1).c_str());
   if (!options.out.empty()) write_file(options.out, result.dump(1) + "\n");

@@ -25,7 +25,7 @@
 #include "parts.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
-#include "patina/base/parallel.h"
+#include "patina/nn/threads.h"
 #include "patina/pipeline/options.h"
 #include "priors_part.h"
 #include "vae_part.h"
@@ -102,7 +102,7 @@ json at_or_null(const json& values, const char* pointer) {
 void run(const Arguments& arguments) {
   const fs::path folder = fs::path(arguments.out).replace_extension();
   fs::create_directories(folder);
-  set_num_threads(arguments.threads);
+  nn::set_num_threads(arguments.threads);
   std::vector<HeldOutAsset> assets = held_out_assets(arguments.shared, arguments.repository);
   assets.resize(std::min(assets.size(), static_cast<size_t>(arguments.num_assets)));
 

@@ -1,22 +1,14 @@
 #include "patina/nn/threads.h"
 
-#include <cstdlib>
+#include <ATen/Parallel.h>
 
-#if defined(__linux__)
-#include <unistd.h>
-#endif
+#include "patina/base/parallel.h"
 
 namespace patina::nn {
 
-void sleep_between_parallel_regions(char** argv) {
-#if defined(__linux__)
-  if (std::getenv("OMP_WAIT_POLICY") || std::getenv("GOMP_SPINCOUNT")) return;
-  ::setenv("OMP_WAIT_POLICY", "passive", 0);
-  ::execv("/proc/self/exe", argv);
-  // Where that fails (no /proc) the program goes on, with threads that spin.
-#else
-  static_cast<void>(argv);
-#endif
+void set_num_threads(int num_threads) {
+  patina::set_num_threads(num_threads);
+  at::set_num_threads(patina::num_threads());
 }
 
 }  // namespace patina::nn

@@ -7,7 +7,6 @@
 
 #include "dev/golden/golden.h"
 #include "patina/base/error.h"
-#include "patina/nn/threads.h"
 
 namespace {
 
@@ -42,7 +41,6 @@ int run(const std::filesystem::path& model, const std::filesystem::path& golden)
 }  // namespace
 
 int main(int argc, char** argv) {
-  patina::nn::sleep_between_parallel_regions(argv);
   if (argc != 3) {
     std::fprintf(stderr,
                  "usage: golden_check MODEL_DIR GOLDEN_DIR\n"
