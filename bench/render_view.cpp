@@ -2,7 +2,6 @@
 // for comparison how many camera rays a second the same scene answers when nothing is shaded. With
 // --reference it also compares the render with another one of the same view; bench/compare_cycles.py does so
 // with Blender's Cycles.
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -10,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/parallel.h"
@@ -21,13 +21,9 @@ namespace {
 
 using namespace patina;
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// Camera rays a second that `scene` answers when nothing is shaded.
 double camera_rays_per_second(const render::Scene& scene, const render::Camera& camera) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   int64_t rays = 0;
   do {
     parallel_for(0, camera.height, 4, [&](int64_t begin, int64_t end) {
@@ -127,7 +123,7 @@ int main(int argc, char** argv) {
     const vec3 eye = eye_values.empty() ? target + distance * glm::normalize(vec3(0.5f, 0.4f, 1.0f))
                                         : vec3(eye_values[0], eye_values[1], eye_values[2]);
 
-    auto start = std::chrono::steady_clock::now();
+    auto start = Clock::now();
     render::Scene::Options scene_options;
     if (principled) scene_options.bsdf_model = render::BsdfModel::kPrincipled;
     const render::Scene scene(
@@ -141,7 +137,7 @@ int main(int argc, char** argv) {
     options.samples_per_pixel = samples;
     options.max_depth = depth;
     options.show_environment = show_environment;
-    start = std::chrono::steady_clock::now();
+    start = Clock::now();
     const render::Render result = render::render(scene, camera, options);
     const double seconds = seconds_since(start);
     const double paths = static_cast<double>(size) * size * samples;

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <functional>
 
+#include "patina/base/clock.h"
 #include "patina/image/color.h"
 #include "patina/inverse/evidence.h"
 #include "patina/inverse/loss.h"
@@ -18,11 +18,6 @@ namespace {
 // A texel counts as seen from a tenth of a fully weighted pixel on: the rim that a bilinear look-up just
 // touches says nothing.
 constexpr float kMinEvidence = 0.1f;
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 void flatten(asset::Map& map) {
   const auto channels = static_cast<size_t>(map.texels.channels);

@@ -11,6 +11,7 @@
 #include "patina/asset/obj_reader.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 
 namespace patina::asset {
 namespace {
@@ -38,9 +39,7 @@ Asset read_asset(const std::filesystem::path& path) {
   const auto is_space = [](uint8_t c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
   size_t first = file.size() >= 3 && file[0] == 0xEF && file[1] == 0xBB && file[2] == 0xBF ? 3 : 0;
   while (first < file.size() && is_space(file[first])) ++first;
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = lowered(path.extension().string());
   const uint8_t c = first < file.size() ? file[first] : 0;
   if (c == '{' || c == '[' || extension == ".gltf") return read_gltf(path, std::move(file));
   if (extension == ".obj") return read_obj(path, std::move(file));

@@ -8,6 +8,7 @@
 #include "patina/asset/uri.h"
 #include "patina/base/check.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 
 namespace patina::asset {
 namespace {
@@ -116,9 +117,7 @@ void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::s
                 "the output is the input file; choose another name, so that the original is kept");
   const ExportRequest request{asset, maps, changed, path};
   const bool from_obj = asset.source->kind == SourceDocument::Kind::kObj;
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = lowered(path.extension().string());
   if (extension == ".glb") return from_obj ? export_obj_as_glb(request) : export_gltf(request, true);
   if (extension == ".gltf" && !from_obj) return export_gltf(request, false);
   if (extension == ".obj" && from_obj) return export_obj(request);

@@ -10,6 +10,7 @@
 #include "patina/asset/obj_text.h"
 #include "patina/asset/texture_bake.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/image/image_io.h"
 
 namespace patina::asset {
@@ -74,11 +75,6 @@ Statements statements_of(const ExportRequest& request, size_t i, SidecarFiles& s
   return statements;
 }
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
 std::string joined(const Statements& statements) {
   std::string out;
   for (const auto& [keyword, text] : statements)
@@ -104,7 +100,7 @@ std::string changed_library(const std::string& text, std::map<std::string, State
       out += joined(found->second);
       at = next;
       by_material.erase(found);
-    } else if (std::find(replaced.begin(), replaced.end(), lower(line.keyword)) != replaced.end()) {
+    } else if (std::find(replaced.begin(), replaced.end(), lowered(line.keyword)) != replaced.end()) {
       out.append(text, at, line.begin - at);
       at = std::min(line.end + 1, text.size());
     }

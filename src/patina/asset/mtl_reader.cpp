@@ -9,6 +9,7 @@
 #include "patina/asset/obj_text.h"
 #include "patina/asset/uri.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 
 namespace patina::asset {
 namespace {
@@ -32,9 +33,7 @@ class MtlReader {
   std::map<std::string, MtlMaterial> read() {
     for (const TextLine& line : text_lines(text_)) {
       line_ = &line;
-      std::string keyword = line.keyword;
-      std::transform(keyword.begin(), keyword.end(), keyword.begin(),
-                     [](unsigned char c) { return std::tolower(c); });
+      const std::string keyword = lowered(line.keyword);
       if (keyword == "newmtl") {
         current_ = &materials_[line.rest];
         *current_ = MtlMaterial{};

@@ -1,10 +1,10 @@
 #include "patina/diffusion/list_models.h"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 
 #include "patina/base/error.h"
+#include "patina/base/text.h"
 #include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/infer_config.h"
 #include "patina/diffusion/files/network_part.h"
@@ -15,11 +15,6 @@ namespace patina::diffusion {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lowered(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 std::string short_type(nn::ElementType type) {
   return lowered(std::string(nn::name_of(type)));

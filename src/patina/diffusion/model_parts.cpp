@@ -1,13 +1,13 @@
 #include "patina/diffusion/model_parts.h"
 
 #include <algorithm>
-#include <cctype>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/search_folders.h"
 #include "patina/diffusion/list_models.h"
@@ -19,10 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string lowered(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 /// What the model folders hold, looked up when first needed.
 class Folders {

@@ -1,9 +1,9 @@
 #include "patina/inverse/fit.h"
 
-#include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/inverse/fit_result.h"
 #include "patina/inverse/fit_setup.h"
@@ -14,12 +14,7 @@
 namespace patina::inverse {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr double kSecondsBetweenCheckpoints = 20, kSecondsBetweenPreviews = 5;
-
-double seconds_since(Clock::time_point time) {
-  return std::chrono::duration<double>(Clock::now() - time).count();
-}
 
 // The pixels that count, with the colours of the views as they are.
 std::vector<CachePixel> counted_pixels(const views::ViewSet& views, std::span<const Image> edited,

@@ -2,12 +2,11 @@
 
 #include <unistd.h>
 
-#include <cctype>
-
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/diffusion/model.h"
 #include "patina/pipeline/options.h"
 
@@ -15,15 +14,6 @@ namespace patina::pipeline {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-namespace {
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-}  // namespace
 
 void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
@@ -86,7 +76,7 @@ void check_inputs(const Config& config) {
 
 void check_output(const fs::path& output) {
   if (output.empty()) return;
-  const std::string extension = lower_case(output.extension().string());
+  const std::string extension = lowered(output.extension().string());
   if (extension != ".glb" && extension != ".gltf" && extension != ".obj")
     throw Error(ErrorCode::kUsage, "output",
                 fmt::format("expected a name that ends in .glb, .gltf or .obj, found '{}'",

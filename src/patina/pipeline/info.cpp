@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 
 #include "patina/asset/asset.h"
 #include "patina/asset/material_maps.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/image/image_io.h"
 #include "patina/nn/safetensors.h"
 
@@ -137,9 +137,7 @@ std::string describe_weights(const fs::path& path) {
 }  // namespace
 
 std::string describe_file(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lowered(path.extension().string());
   if (extension == ".gltf" || extension == ".glb" || extension == ".obj") return describe_asset(path);
   if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return describe_image(path);
   if (extension == ".hdr" || extension == ".exr") return describe_environment(path);

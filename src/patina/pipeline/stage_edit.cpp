@@ -1,10 +1,10 @@
 // The second stage: noise and correspondences from the geometry, then the diffusion model over the whole
 // grid.
 #include <algorithm>
-#include <chrono>
 
 #include <fmt/format.h>
 
+#include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/base/memory.h"
 #include "patina/correspond/correspondences.h"
@@ -63,10 +63,6 @@ void warn_of_memory(const diffusion::EditMemory& memory, const EditSettings& set
                   settings.low_memory ? "" : ", or low memory"));
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 }  // namespace
 
 PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
@@ -76,7 +72,7 @@ PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, co
     throw Error(ErrorCode::kUsage, "resolution", fmt::format("this model needs a multiple of {}", scale));
 
   PreparedEdit prepared;
-  auto start = std::chrono::steady_clock::now();
+  auto start = Clock::now();
   std::vector<uint64_t> seeds;  // of fields of four channels
   for (int block = 0; 4 * block < model.latent_channels(); ++block)
     seeds.push_back(correspond::block_seed(settings.options.seed, block));
@@ -95,7 +91,7 @@ PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, co
                      .noise = std::move(noise),
                      .bias_levels = {}};
   if (settings.options.bias_weight != 0) {
-    start = std::chrono::steady_clock::now();
+    start = Clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
     prepared.correspond_seconds = seconds_since(start);
   }
@@ -107,7 +103,7 @@ std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views
                               const RunProgress& progress) {
   const std::string key = edit_key(bench, views, settings, resolved);
   run.run_stage("detail", key, progress, [&] {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     const int64_t bytes_before = resident_bytes();
     const bool loads = !resolved.is_loaded();  // else its weights are among the bytes before
     const diffusion::Model& model = resolved.loaded();
