@@ -17,7 +17,7 @@ using nlohmann::json;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-enum class Unit { kNone, kShare, kDecibel };
+enum class Unit { kNone, kShare, kDecibel, kEv };
 
 struct Range {
   double low, high;
@@ -42,8 +42,8 @@ constexpr std::array kMeasures{
             {0.9, 1},
             {0.7, 1},
             "90 % or more",
-            "Share of the surface that at least one view sees. What no view sees takes the change around "
-            "it, smoothly, or keeps its old texture (--unseen)."},
+            "Share of the surface that at least one view sees. Unseen texels take the change around them, "
+            "smoothly, or keep their old values (--unseen)."},
     Measure{
         "/consistency/edit_correlation",
         "Views agree, correlation",
@@ -60,13 +60,15 @@ constexpr std::array kMeasures{
             "24 dB or more",
             "How little the edits of two views differ at the same point. Low values end as blur in the "
             "textures."},
-    Measure{"/fit/psnr",
-            "Textures reproduce the edit",
-            Unit::kDecibel,
-            {27, kInfinity},
-            {22, kInfinity},
-            "27 dB or more",
-            "The asset rendered with its new textures against the edited views."},
+    Measure{
+        "/fit/psnr",
+        "Textures reproduce the edit",
+        Unit::kDecibel,
+        {27, kInfinity},
+        {22, kInfinity},
+        "27 dB or more",
+        "The asset rendered with its new textures against the edited views, in the light of the views. How "
+        "it looks in other light is for your eye."},
     Measure{"/fit/sharpness",
             "Sharpness kept",
             Unit::kShare,
@@ -74,8 +76,7 @@ constexpr std::array kMeasures{
             {0.3, 1.6},
             "60 to 125 %",
             "Energy of fine detail in those renders over that of the edited views. Low: detail was averaged "
-            "away; "
-            "above 100 %: the textures or the renders add noise."},
+            "away. Above 100 %: the textures or the renders add noise."},
     Measure{"/noise/mean",
             "Starting noise, mean",
             Unit::kNone,
@@ -106,12 +107,57 @@ constexpr std::array kMeasures{
             "Kolmogorov–Smirnov test against the normal distribution."},
 };
 
+// A value that has a name and a meaning, but is neither good nor bad.
+struct Fact {
+  const char* pointer;  // into the metrics
+  const char* name;
+  Unit unit;
+  const char* meaning;
+};
+
+constexpr std::array kFacts{
+    Fact{"/coverage_twice", "Surface seen twice", Unit::kShare, "Share that at least two views see."},
+    Fact{"/consistency/covisible_pixels", "Pixels compared", Unit::kNone,
+         "Pixels of one view whose surface point another view sees: what the agreement of views is measured "
+         "on."},
+    Fact{"/fit/psnr_before", "Old textures against the edit", Unit::kDecibel,
+         "The asset as it came against the edited views. The lower, the stronger the edit."},
+    Fact{
+        "/fit/training_psnr", "Textures reproduce the edit, in the fit", Unit::kDecibel,
+        "The same as the fit itself saw it: with few light samples a pixel, and with views moved toward each "
+        "other."},
+    Fact{"/exposure_ev", "Exposure", Unit::kEv, "Of all views, from radiance to what is shown and edited."},
+    Fact{"/guidance/scale", "Guidance", Unit::kNone, "How strongly the prompt pulls; 1 is no guidance."},
+    Fact{"/guidance/negative_prompt", "Guided away from", Unit::kNone, "The negative prompt."},
+    Fact{"/model", "Diffusion model", Unit::kNone, "Architecture, size and precision."},
+};
+
+// Textures that the fit made, {"material", "width", "height", "texels_per_pixel"} each.
+constexpr const char* kDensities = "/fit/density";
+constexpr Measure kDensity{"",
+                           "Texels a pixel",
+                           Unit::kNone,
+                           {1, kInfinity},
+                           {0.5, kInfinity},
+                           "1 or more",
+                           "Along one side. Below 1 the views show more detail than the texture can hold; "
+                           "--texture-size auto makes it larger."};
+
+// The number under `key`, or nullopt where there is none.
+std::optional<double> number_at(const json& object, const char* key) {
+  const auto found = object.is_object() ? object.find(key) : object.end();
+  if (!object.is_object() || found == object.end() || !found->is_number()) return std::nullopt;
+  return found->get<double>();
+}
+
 std::string with_unit(double value, Unit unit) {
   switch (unit) {
     case Unit::kShare:
       return number(100 * value) + " %";
     case Unit::kDecibel:
       return number(value) + " dB";
+    case Unit::kEv:
+      return number(value) + " EV";
     case Unit::kNone:
       break;
   }
@@ -132,29 +178,67 @@ std::string plain_value(const json& value) {
   return escaped(value.dump(-1, ' ', false, json::error_handler_t::replace), 400);
 }
 
-bool is_known(const std::string& pointer) {
+// The pieces are markup already. A value that is no number is text, which wraps over the next column.
+std::string row(const std::string& name, const std::string& value, const std::string& mark,
+                const std::string& meaning) {
+  return fmt::format(
+      "<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td class=\"mark\">{}</td><td "
+      "class=\"meaning\">{}</td></tr>\n",
+      name, value, mark, meaning);
+}
+std::string text_row(const std::string& name, const std::string& text, const std::string& meaning) {
+  return fmt::format("<tr><th scope=\"row\">{}</th><td class=\"text\" colspan=\"{}\">{}</td>{}</tr>\n", name,
+                     meaning.empty() ? 3 : 2, text,
+                     meaning.empty() ? "" : "<td class=\"meaning\">" + meaning + "</td>");
+}
+
+std::string judged_row(const Measure& measure, const std::string& name, double value,
+                       const std::string& meaning) {
+  return row(name, with_unit(value, measure.unit),
+             verdict(measure, value) + fmt::format("<small>good: {}</small>", measure.target), meaning);
+}
+
+std::string density_rows(const json& densities) {
+  std::string rows;
+  for (const json& one : densities) {
+    const auto texels = number_at(one, "texels_per_pixel");
+    if (!texels) continue;
+    const std::string material = one.contains("material") ? plain_value(one["material"]) : "";
+    rows += judged_row(
+        kDensity, fmt::format("{}, {}", kDensity.name, material), *texels,
+        fmt::format("The texture has {} × {} texels. {}", number(number_at(one, "width").value_or(0)),
+                    number(number_at(one, "height").value_or(0)), kDensity.meaning));
+  }
+  return rows;
+}
+
+std::string fact_row(const Fact& fact, const json& value) {
+  if (value.is_number()) return row(fact.name, with_unit(value.get<double>(), fact.unit), "", fact.meaning);
+  if (value.is_null() || (value.is_string() && value.get_ref<const std::string&>().empty())) return "";
+  return text_row(fact.name, plain_value(value), fact.meaning);
+}
+
+bool is_measure(const std::string& pointer) {
   return std::any_of(kMeasures.begin(), kMeasures.end(),
                      [&](const Measure& m) { return pointer == m.pointer; });
 }
-
-// Rows for whatever is in `value` that no Measure describes as a number.
-void append_others(const json& value, const std::string& pointer, std::string& rows) {
-  if (value.is_object()) {
-    for (const auto& [key, child] : value.items())
-      if (!(pointer.empty() && key == "stages")) append_others(child, pointer + "/" + key, rows);
-  } else if (!pointer.empty() && !(is_known(pointer) && value.is_number())) {
-    std::string name = pointer.substr(1);
-    std::replace(name.begin(), name.end(), '/', '.');
-    rows += fmt::format("<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td></td><td></td></tr>\n",
-                        escaped(name), plain_value(value));
-  }
+bool is_fact(const std::string& pointer) {
+  return std::any_of(kFacts.begin(), kFacts.end(), [&](const Fact& f) { return pointer == f.pointer; });
 }
 
-// The number under `key`, or nullopt where there is none.
-std::optional<double> number_at(const json& object, const char* key) {
-  const auto found = object.is_object() ? object.find(key) : object.end();
-  if (!object.is_object() || found == object.end() || !found->is_number()) return std::nullopt;
-  return found->get<double>();
+// Rows for whatever is in `value` that has no row of its own.
+std::string other_rows(const json& value, const std::string& pointer) {
+  if (is_fact(pointer) || (is_measure(pointer) && value.is_number())) return "";
+  if ((pointer == kDensities && value.is_array()) || pointer == "/stages") return "";
+  if (value.is_object()) {
+    std::string rows;
+    for (const auto& [key, child] : value.items()) rows += other_rows(child, pointer + "/" + key);
+    return rows;
+  }
+  std::string name = pointer.substr(1);
+  std::replace(name.begin(), name.end(), '/', '.');
+  return value.is_number() ? row(escaped(name), plain_value(value), "", "")
+                           : text_row(escaped(name), plain_value(value), "");
 }
 
 const json& stages_of(const json& metrics) {
@@ -167,18 +251,17 @@ const json& stages_of(const json& metrics) {
 
 std::string metrics_table(const json& metrics) {
   if (!metrics.is_object()) return "";
+  const auto value_at = [&](const char* pointer) {
+    const json::json_pointer at(pointer);
+    return metrics.contains(at) ? metrics[at] : json();
+  };
   std::string rows;
-  for (const Measure& measure : kMeasures) {
-    const json::json_pointer pointer(measure.pointer);
-    if (!metrics.contains(pointer) || !metrics[pointer].is_number()) continue;
-    const double value = metrics[pointer].get<double>();
-    rows += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td>{}<small>good: {}</small></td><td "
-        "class=\"meaning\">{}</td></tr>\n",
-        measure.name, with_unit(value, measure.unit), verdict(measure, value), measure.target,
-        measure.meaning);
-  }
-  append_others(metrics, "", rows);
+  for (const Measure& measure : kMeasures)
+    if (const json value = value_at(measure.pointer); value.is_number())
+      rows += judged_row(measure, measure.name, value.get<double>(), measure.meaning);
+  if (const json densities = value_at(kDensities); densities.is_array()) rows += density_rows(densities);
+  for (const Fact& fact : kFacts) rows += fact_row(fact, value_at(fact.pointer));
+  for (const auto& [key, value] : metrics.items()) rows += other_rows(value, "/" + key);
   if (rows.empty()) return "";
   return "<table class=\"metrics\"><thead><tr><th scope=\"col\">Measure</th><th scope=\"col\" "
          "class=\"value\">Value</th>"

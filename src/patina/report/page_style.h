@@ -101,10 +101,10 @@ th, td { padding:.6rem 1rem .6rem 0; border-bottom:1px solid var(--line); text-a
 th { font-weight:500; }
 .value { text-align:right; font-variant-numeric:tabular-nums; white-space:nowrap; padding-right:2rem; }
 .stages .value:last-child { padding-right:0; }
-.metrics { min-width:44rem; }
-.metrics tbody th { white-space:nowrap; }
+.metrics tbody th { width:22%; min-width:8rem; }
+.text { overflow-wrap:anywhere; }
 .meaning { color:var(--quiet); font-size:.875rem; width:45%; padding-right:0; }
-.metrics td small { display:block; white-space:nowrap; }
+.metrics td small { display:block; }
 .good::before { content:"\25CF\2002"; color:var(--patina); }
 .fair::before { content:"\25D0\2002"; color:var(--gold); }
 .poor::before { content:"\25CB\2002"; color:var(--copper); }
@@ -133,6 +133,12 @@ footer { margin-top:3rem; color:var(--quiet); font-size:.8125rem; }
   .sheet { grid-template-columns:repeat(min(2,var(--columns)),minmax(0,1fr)); }
   #c-side:checked~.sheet .view, .heads { grid-template-columns:1.1rem repeat(var(--kinds),minmax(0,1fr));
     gap:.35rem; }
+  .metrics thead { display:none; }
+  .metrics tr { display:grid; grid-template-columns:1fr auto; border-bottom:1px solid var(--line); }
+  .metrics th, .metrics td { width:auto; border-bottom:0; padding:.3rem 0; }
+  .metrics .value { padding-left:1rem; }
+  .metrics .mark, .metrics .text, .metrics .meaning { grid-column:1/-1; }
+  .metrics .mark:empty, .metrics .meaning:empty { display:none; }
 }
 
 /* Paper: white, always side by side. */
