@@ -11,10 +11,10 @@
 #include <memory>
 #include <numbers>
 
-#include "patina/base/bf16.h"
 #include "patina/attention/cpu/kernel.h"
 #include "patina/attention/cpu/transpose.h"
 #include "patina/attention/query_blocks.h"
+#include "patina/base/bf16.h"
 #include "patina/base/parallel.h"
 
 namespace patina::attention {
@@ -195,115 +195,188 @@ void write_rows(const Arguments& a, int64_t out_base, const QueryBlock& block, c
   }
 }
 
-}  // namespace
-
-void run_blocks(const Arguments& a, const Kernel& kernel) {
-  const Shape& n = a.shape;
-  const KeyBuckets* buckets = a.beta != 0 ? a.buckets : nullptr;
-  const std::vector<QueryBlock> blocks = make_query_blocks(n.num_queries, buckets);
-  const PackedSizes sizes = packed_sizes(kernel.packing, n.num_keys, n.head_dim);
-  // Scores live in units of log 2, so that the softmax needs 2^x.
-  const float scale = static_cast<float>(static_cast<double>(a.scale) * std::numbers::log2e);
-  const float beta = static_cast<float>(static_cast<double>(a.beta) * std::numbers::log2e);
-  const BiasedKey no_bias{std::numeric_limits<int32_t>::max(), 0};
-
-  const int64_t num_heads = n.batch * n.num_heads;  // every (batch, head) pair
-  const int64_t head_bytes = sizes.k_bytes + sizes.v_bytes;
-  const int64_t group = std::clamp<int64_t>(kGroupBytes / head_bytes, 1, num_heads);
-  const AlignedBytes packed = aligned_bytes(group * head_bytes);
-  std::vector<std::atomic<bool>> moderate(static_cast<size_t>(group));  // one a head of the group
-  const auto base = [&](const Strides& s, int64_t head) {
-    return head / n.num_heads * s.batch + head % n.num_heads * s.head;
-  };
-
-  const int head_dim = static_cast<int>(n.head_dim);
-  const int64_t state_bytes = kernel.state_floats ? kernel.state_floats(head_dim) * 4 : 0;
-  const int64_t panel_keys =
+/// How a call is cut: heads into groups, keys into panels, blocks of queries into runs.
+struct Cut {
+  int64_t num_heads;   // every (batch, head) pair
+  int64_t head_bytes;  // packed keys and values of one
+  int64_t group;       // heads that are packed at a time
+  int64_t panel_keys;
+  int64_t state_bytes;  // of one block
+  int64_t run;          // blocks
+  int64_t num_runs;
+};
+Cut cut_of(const Shape& n, const Kernel& kernel, const PackedSizes& sizes, int64_t num_blocks) {
+  Cut cut{};
+  cut.num_heads = n.batch * n.num_heads;
+  cut.head_bytes = sizes.k_bytes + sizes.v_bytes;
+  cut.group = std::clamp<int64_t>(kGroupBytes / cut.head_bytes, 1, cut.num_heads);
+  cut.panel_keys =
       kernel.takes_panels
-          ? std::max(kPanelKeys, kPanelBytes * sizes.keys / head_bytes / kPanelKeys * kPanelKeys)
+          ? std::max(kPanelKeys, kPanelBytes * sizes.keys / cut.head_bytes / kPanelKeys * kPanelKeys)
           : n.num_keys;
+  cut.state_bytes = kernel.state_floats ? kernel.state_floats(static_cast<int>(n.head_dim)) * 4 : 0;
   // As long a run as fits, if that leaves a few tasks to each thread; of one block where there is one panel.
-  const int64_t num_blocks = static_cast<int64_t>(blocks.size());
-  const int64_t run =
-      panel_keys >= n.num_keys
-          ? 1
-          : std::clamp<int64_t>(std::min(kRunBytes / (state_bytes + sizes.q_bytes),
-                                         num_blocks * num_heads / (int64_t{4} * num_threads())),
-                                1, num_blocks);
-  const int64_t num_runs = (num_blocks + run - 1) / run;
+  cut.run = cut.panel_keys >= n.num_keys
+                ? 1
+                : std::clamp<int64_t>(std::min(kRunBytes / (cut.state_bytes + sizes.q_bytes),
+                                               num_blocks * cut.num_heads / (int64_t{4} * num_threads())),
+                                      1, num_blocks);
+  cut.num_runs = (num_blocks + cut.run - 1) / cut.run;
+  return cut;
+}
 
-  for (int64_t head0 = 0; head0 < num_heads; head0 += group) {
-    const int64_t heads = std::min(group, num_heads - head0);
-    const auto keys_of = [&](int64_t head) { return packed.get() + (head - head0) * head_bytes; };
-    for (std::atomic<bool>& m : moderate) m = true;
+/// What one thread works in: the queries of a run, their states, biased keys and results.
+struct Workspace {
+  Workspace(const Cut& cut, const PackedSizes& sizes, const Shape& n)
+      : out_floats(round_up(n.head_dim, 16) * kBlockQueries),
+        queries(aligned_bytes(cut.run * sizes.q_bytes)),
+        states(aligned_bytes(cut.run * cut.state_bytes)),
+        floats(aligned_bytes((kScratchFloats + out_floats + kBlockQueries) * 4)),
+        rounded(static_cast<size_t>(out_floats)),
+        pairs(static_cast<size_t>(out_floats / 2)),
+        biased(static_cast<size_t>(cut.run), {BiasedKey{std::numeric_limits<int32_t>::max(), 0}}),
+        immoderate(static_cast<size_t>(cut.run)) {
+    block.scratch = reinterpret_cast<float*>(floats.get());
+    block.out = block.scratch + kScratchFloats;
+    block.log_sum_exp = block.out + out_floats;
+    block.num_keys = n.num_keys;
+    block.head_dim = static_cast<int>(n.head_dim);
+  }
 
+  int64_t out_floats;
+  AlignedBytes queries, states, floats;
+  std::vector<uint16_t> rounded;
+  std::vector<uint32_t> pairs;
+  std::vector<std::vector<BiasedKey>> biased;
+  int64_t listed_run = -1;  // whose lists `biased` holds: the heads of a run follow each other and share them
+  std::vector<uint64_t> immoderate;
+  Block block;
+};
+
+/// One call: packs a group of heads, attends all queries to it, and goes on to the next group.
+class Driver {
+ public:
+  Driver(const Arguments& arguments, const Kernel& kernel)
+      : a_(arguments),
+        kernel_(kernel),
+        buckets_(a_.beta != 0 ? a_.buckets : nullptr),
+        blocks_(make_query_blocks(a_.shape.num_queries, buckets_)),
+        sizes_(packed_sizes(kernel.packing, a_.shape.num_keys, a_.shape.head_dim)),
+        cut_(cut_of(a_.shape, kernel, sizes_, static_cast<int64_t>(blocks_.size()))),
+        scale_(in_log_2(a_.scale)),
+        beta_(in_log_2(a_.beta)),
+        packed_(aligned_bytes(cut_.group * cut_.head_bytes)),
+        moderate_(static_cast<size_t>(cut_.group)) {}
+
+  void run() {
+    for (head0_ = 0; head0_ < cut_.num_heads; head0_ += cut_.group) {
+      heads_ = std::min(cut_.group, cut_.num_heads - head0_);
+      pack_group();
+      attend_group();
+    }
+  }
+
+ private:
+  /// Scores live in units of log 2, so that the softmax needs 2^x.
+  static float in_log_2(float value) {
+    return static_cast<float>(static_cast<double>(value) * std::numbers::log2e);
+  }
+  int64_t base(const Strides& s, int64_t head) const {
+    return head / a_.shape.num_heads * s.batch + head % a_.shape.num_heads * s.head;
+  }
+  std::byte* keys_of(int64_t head) const { return packed_.get() + (head - head0_) * cut_.head_bytes; }
+  std::byte* values_of(int64_t head) const { return keys_of(head) + sizes_.k_bytes; }
+
+  void pack_group() {
+    for (std::atomic<bool>& m : moderate_) m = true;
     constexpr int64_t kChunk = 1024;  // keys a task, a multiple of kPanelKeys
-    const int64_t chunks = (n.num_keys + kChunk - 1) / kChunk;
-    parallel_for(0, heads * chunks, 1, [&](int64_t begin, int64_t end) {
+    const int64_t num_keys = a_.shape.num_keys, chunks = (num_keys + kChunk - 1) / kChunk;
+    parallel_for(0, heads_ * chunks, 1, [&](int64_t begin, int64_t end) {
       for (int64_t task = begin; task < end; ++task) {
-        const int64_t head = head0 + task / chunks, key0 = task % chunks * kChunk;
-        if (!pack_keys_values(a, kernel.packing, sizes, base(a.k_strides, head), base(a.v_strides, head),
-                              key0, std::min(key0 + kChunk, n.num_keys), keys_of(head),
-                              keys_of(head) + sizes.k_bytes))
-          moderate[static_cast<size_t>(head - head0)] = false;
-      }
-    });
-
-    parallel_for(0, num_runs * heads, 1, [&](int64_t begin, int64_t end) {
-      const AlignedBytes queries = aligned_bytes(run * sizes.q_bytes),
-                         states = aligned_bytes(run * state_bytes);
-      const int64_t out_floats = round_up(n.head_dim, 16) * kBlockQueries;
-      const AlignedBytes work = aligned_bytes((kScratchFloats + out_floats + kBlockQueries) * 4);
-      Block block;
-      block.scratch = reinterpret_cast<float*>(work.get());
-      block.out = block.scratch + kScratchFloats;
-      block.log_sum_exp = block.out + out_floats;
-      block.num_keys = n.num_keys;
-      block.head_dim = head_dim;
-      block.score_scale = kernel.packing == Packing::kF32 ? 1.0f : scale;
-      block.beta = beta;
-
-      std::vector<uint16_t> rounded(static_cast<size_t>(out_floats));
-      std::vector<uint32_t> pairs(static_cast<size_t>(out_floats / 2));
-      std::vector<std::vector<BiasedKey>> biased(static_cast<size_t>(run), {no_bias});
-      std::vector<uint64_t> immoderate(static_cast<size_t>(run));
-      int64_t listed_run =
-          -1;  // whose lists `biased` holds: the heads of a run follow each other and share them
-      for (int64_t task = begin; task < end; ++task) {
-        const int64_t run_index = task / heads, head = head0 + task % heads;
-        const int64_t first = run_index * run, count = std::min(run, num_blocks - first);
-        const bool keys_moderate = moderate[static_cast<size_t>(head - head0)];
-        for (int64_t i = 0; i < count; ++i) {
-          const QueryBlock& queries_of = blocks[static_cast<size_t>(first + i)];
-          if (buckets && listed_run != run_index)
-            biased[static_cast<size_t>(i)] = biased_keys_of_block(*buckets, queries_of);
-          const uint64_t lanes = pack_queries(a, kernel.packing, sizes, base(a.q_strides, head), queries_of,
-                                              scale, pairs.data(), queries.get() + i * sizes.q_bytes);
-          immoderate[static_cast<size_t>(i)] = keys_moderate ? lanes : ~uint64_t{0};
-        }
-        listed_run = run_index;
-        block.k = keys_of(head);
-        block.v = keys_of(head) + sizes.k_bytes;
-        for (int64_t key0 = 0; key0 < n.num_keys; key0 += panel_keys)
-          for (int64_t i = 0; i < count; ++i) {
-            const QueryBlock& queries_of = blocks[static_cast<size_t>(first + i)];
-            block.begin_key = key0;
-            block.end_key = std::min(key0 + panel_keys, n.num_keys);
-            block.num_lanes = queries_of.num_lanes();
-            block.biased = biased[static_cast<size_t>(i)].data();
-            block.immoderate_lanes = immoderate[static_cast<size_t>(i)];
-            block.q = queries.get() + i * sizes.q_bytes;
-            block.state = reinterpret_cast<float*>(states.get() + i * state_bytes);
-            kernel.attend(block);
-            if (block.end_key < n.num_keys) continue;
-            write_rows(a, base(a.out_strides, head), queries_of, block.out, rounded.data());
-            if (a.log_sum_exp)
-              for (int lane = 0; lane < block.num_lanes; ++lane)
-                a.log_sum_exp[head * n.num_queries + queries_of.query(lane)] = block.log_sum_exp[lane];
-          }
+        const int64_t head = head0_ + task / chunks, key0 = task % chunks * kChunk;
+        if (!pack_keys_values(a_, kernel_.packing, sizes_, base(a_.k_strides, head), base(a_.v_strides, head),
+                              key0, std::min(key0 + kChunk, num_keys), keys_of(head), values_of(head)))
+          moderate_[static_cast<size_t>(head - head0_)] = false;
       }
     });
   }
+
+  void attend_group() {
+    parallel_for(0, cut_.num_runs * heads_, 1, [&](int64_t begin, int64_t end) {
+      Workspace work(cut_, sizes_, a_.shape);
+      work.block.score_scale = kernel_.packing == Packing::kF32 ? 1.0f : scale_;
+      work.block.beta = beta_;
+      for (int64_t task = begin; task < end; ++task) {
+        const int64_t run = task / heads_, head = head0_ + task % heads_;
+        pack_run(run, head, work);
+        attend_run(run, head, work);
+      }
+    });
+  }
+
+  int64_t first_block(int64_t run) const { return run * cut_.run; }
+  int64_t num_blocks(int64_t run) const {
+    return std::min(cut_.run, static_cast<int64_t>(blocks_.size()) - first_block(run));
+  }
+  const QueryBlock& block_of(int64_t run, int64_t i) const {
+    return blocks_[static_cast<size_t>(first_block(run) + i)];
+  }
+
+  void pack_run(int64_t run, int64_t head, Workspace& work) const {
+    const bool keys_moderate = moderate_[static_cast<size_t>(head - head0_)];
+    for (int64_t i = 0; i < num_blocks(run); ++i) {
+      const QueryBlock& queries = block_of(run, i);
+      if (buckets_ && work.listed_run != run)
+        work.biased[static_cast<size_t>(i)] = biased_keys_of_block(*buckets_, queries);
+      const uint64_t lanes = pack_queries(a_, kernel_.packing, sizes_, base(a_.q_strides, head), queries,
+                                          scale_, work.pairs.data(), work.queries.get() + i * sizes_.q_bytes);
+      work.immoderate[static_cast<size_t>(i)] = keys_moderate ? lanes : ~uint64_t{0};
+    }
+    work.listed_run = run;
+  }
+
+  void attend_run(int64_t run, int64_t head, Workspace& work) const {
+    Block& block = work.block;
+    block.k = keys_of(head);
+    block.v = values_of(head);
+    for (int64_t key0 = 0; key0 < block.num_keys; key0 += cut_.panel_keys)
+      for (int64_t i = 0; i < num_blocks(run); ++i) {
+        const QueryBlock& queries = block_of(run, i);
+        block.begin_key = key0;
+        block.end_key = std::min(key0 + cut_.panel_keys, block.num_keys);
+        block.num_lanes = queries.num_lanes();
+        block.biased = work.biased[static_cast<size_t>(i)].data();
+        block.immoderate_lanes = work.immoderate[static_cast<size_t>(i)];
+        block.q = work.queries.get() + i * sizes_.q_bytes;
+        block.state = reinterpret_cast<float*>(work.states.get() + i * cut_.state_bytes);
+        kernel_.attend(block);
+        if (block.end_key == block.num_keys) write_results(head, queries, work);
+      }
+  }
+
+  void write_results(int64_t head, const QueryBlock& queries, Workspace& work) const {
+    write_rows(a_, base(a_.out_strides, head), queries, work.block.out, work.rounded.data());
+    if (!a_.log_sum_exp) return;
+    for (int lane = 0; lane < work.block.num_lanes; ++lane)
+      a_.log_sum_exp[head * a_.shape.num_queries + queries.query(lane)] = work.block.log_sum_exp[lane];
+  }
+
+  const Arguments& a_;
+  const Kernel& kernel_;
+  const KeyBuckets* buckets_;
+  const std::vector<QueryBlock> blocks_;
+  const PackedSizes sizes_;
+  const Cut cut_;
+  const float scale_, beta_;
+  const AlignedBytes packed_;                // keys and values of the group's heads
+  std::vector<std::atomic<bool>> moderate_;  // one a head of the group
+  int64_t head0_ = 0, heads_ = 0;            // the group
+};
+
+}  // namespace
+
+void run_blocks(const Arguments& a, const Kernel& kernel) {
+  Driver(a, kernel).run();
 }
 
 }  // namespace patina::attention
