@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patina/asset/texel_index.h"
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
 #include "patina/image/color.h"
@@ -116,22 +117,6 @@ Map emission_map(const Asset& asset, const Material& m, const SrgbDecoder& decod
   });
 }
 
-// Texel index of integer coordinate `i` on an axis of `size` texels.
-int wrapped(int64_t i, int size, Wrap wrap) {
-  switch (wrap) {
-    case Wrap::kClampToEdge:
-      return static_cast<int>(std::clamp<int64_t>(i, 0, size - 1));
-    case Wrap::kMirroredRepeat: {
-      const int64_t period = 2 * int64_t{size};
-      const int64_t m = ((i % period) + period) % period;
-      return static_cast<int>(m < size ? m : period - 1 - m);
-    }
-    case Wrap::kRepeat:
-      break;
-  }
-  return static_cast<int>(((i % size) + size) % size);
-}
-
 // The two texels and the second one's weight on one axis.
 struct AxisTap {
   int texel[2];
@@ -145,10 +130,25 @@ AxisTap axis_tap(float u, int size, Wrap wrap) {
   const float floor = std::floor(x);
   const auto i = static_cast<int64_t>(floor);
   if (i >= 0 && i + 1 < size) return {{static_cast<int>(i), static_cast<int>(i) + 1}, x - floor};
-  return {{wrapped(i, size, wrap), wrapped(i + 1, size, wrap)}, x - floor};
+  return {{texel_index(i, size, wrap), texel_index(i + 1, size, wrap)}, x - floor};
 }
 
 }  // namespace
+
+int texel_index(int64_t i, int size, Wrap wrap) {
+  switch (wrap) {
+    case Wrap::kClampToEdge:
+      return static_cast<int>(std::clamp<int64_t>(i, 0, size - 1));
+    case Wrap::kMirroredRepeat: {
+      const int64_t period = 2 * int64_t{size};
+      const int64_t m = ((i % period) + period) % period;
+      return static_cast<int>(m < size ? m : period - 1 - m);
+    }
+    case Wrap::kRepeat:
+      break;
+  }
+  return static_cast<int>(((i % size) + size) % size);
+}
 
 std::vector<MaterialMaps> resolve_materials(const Asset& asset) {
   const SrgbDecoder decode;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "patina/base/check.h"
+#include "patina/render/frame.h"
 #include "patina/render/lights.h"
 #include "patina/render/microfacet.h"
 #include "patina/render/path_tracer.h"
@@ -59,16 +60,6 @@ vec2 shifted(const vec2& u, const vec2& shift) {
   return glm::min(sum - glm::floor(sum), vec2(0x1.fffffep-1f));
 }
 
-struct Frame {
-  vec3 x, y, z;
-  explicit Frame(const vec3& n) : z(n) {
-    const Basis basis = orthonormal_basis(n);
-    x = basis.tangent, y = basis.bitangent;
-  }
-  vec3 to_local(const vec3& v) const { return {glm::dot(v, x), glm::dot(v, y), glm::dot(v, z)}; }
-  vec3 to_world(const vec3& v) const { return x * v.x + y * v.y + z * v.z; }
-};
-
 }  // namespace
 
 LightGatherer::LightGatherer(const render::Scene& scene, std::span<const asset::MaterialMaps> asset_materials,
@@ -96,7 +87,7 @@ void LightGatherer::gather(const render::SurfacePoint& surface, const vec3& wo, 
   // Choose all directions.
   const render::Lights& lights = scene_.light_sampler();
   const auto counts = shares(options_.num_directions, lights.has_extended(), surface.bsdf.metallic);
-  const Frame frame(surface.n_shading);
+  const render::Frame frame(surface.n_shading);
   const vec3 wo_local = frame.to_local(wo);
   LobeMixture mixture;
   mixture.n = surface.n_shading;

@@ -2,21 +2,14 @@
 
 #include <algorithm>
 
+#include "patina/render/frame.h"
 #include "patina/render/lights.h"
 #include "patina/render/sampling.h"
 
 namespace patina::inverse {
 namespace {
 
-struct Frame {
-  explicit Frame(const vec3& n) : basis(orthonormal_basis(n)), normal(n) {}
-  vec3 to_local(const vec3& v) const {
-    return {glm::dot(v, basis.tangent), glm::dot(v, basis.bitangent), glm::dot(v, normal)};
-  }
-  vec3 to_world(const vec3& v) const { return v.x * basis.tangent + v.y * basis.bitangent + v.z * normal; }
-  Basis basis;
-  vec3 normal;
-};
+using render::Frame;
 
 vec3 reflect(render::BsdfModel model, const Shading& shading, const vec3& wo, const vec3& wi) {
   const Frame frame(shading.n_world);

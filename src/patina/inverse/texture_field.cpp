@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patina/asset/texel_index.h"
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
 
 namespace patina::inverse {
 namespace {
-
-int wrapped(int i, int size, asset::Wrap wrap) {
-  if (wrap == asset::Wrap::kClampToEdge) return std::clamp(i, 0, size - 1);
-  const int period = wrap == asset::Wrap::kRepeat ? size : 2 * size;
-  const int m = ((i % period) + period) % period;
-  return m < size ? m : period - 1 - m;
-}
 
 std::vector<UpsampleTap> upsample_taps(int fine, int coarse, asset::Wrap wrap) {
   std::vector<UpsampleTap> taps(static_cast<size_t>(fine));
@@ -22,8 +16,8 @@ std::vector<UpsampleTap> upsample_taps(int fine, int coarse, asset::Wrap wrap) {
     const float x =
         (static_cast<float>(i) + 0.5f) * static_cast<float>(coarse) / static_cast<float>(fine) - 0.5f;
     const int a = static_cast<int>(std::floor(x));
-    taps[static_cast<size_t>(i)] = {wrapped(a, coarse, wrap), wrapped(a + 1, coarse, wrap),
-                                    x - std::floor(x)};
+    taps[static_cast<size_t>(i)] = {asset::texel_index(a, coarse, wrap),
+                                    asset::texel_index(a + 1, coarse, wrap), x - std::floor(x)};
   }
   return taps;
 }
@@ -205,8 +199,8 @@ Image dilated(const asset::Map& map, const Image& valid, int radius) {
       std::fill_n(out.pixels.begin() + static_cast<std::ptrdiff_t>(i) * out.channels, out.channels, 0.0f);
   }
   const auto neighbour = [&](int x, int y) {
-    return static_cast<size_t>(wrapped(y, in.height, map.wrap_t)) * static_cast<size_t>(in.width) +
-           static_cast<size_t>(wrapped(x, in.width, map.wrap_s));
+    return static_cast<size_t>(asset::texel_index(y, in.height, map.wrap_t)) * static_cast<size_t>(in.width) +
+           static_cast<size_t>(asset::texel_index(x, in.width, map.wrap_s));
   };
   for (int ring = 0; ring < radius; ++ring) {
     std::vector<size_t> filled;

@@ -5,23 +5,12 @@
 
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
+#include "patina/render/frame.h"
 #include "patina/render/lights.h"
 #include "patina/render/sampling.h"
 
 namespace patina::render {
 namespace {
-
-/// The shading frame of a point; directions come and go in world space.
-struct Frame {
-  explicit Frame(const vec3& n) : basis(orthonormal_basis(n)), normal(n) {}
-  vec3 to_local(const vec3& v) const {
-    return {glm::dot(v, basis.tangent), glm::dot(v, basis.bitangent), glm::dot(v, normal)};
-  }
-  vec3 to_world(const vec3& v) const { return v.x * basis.tangent + v.y * basis.bitangent + v.z * normal; }
-
-  Basis basis;
-  vec3 normal;
-};
 
 /// Light that arrives at `point` straight from environment and emitters by one light sample, weighed against
 /// the BSDF's chance to find the same, and from one punctual light, which the BSDF cannot find.
