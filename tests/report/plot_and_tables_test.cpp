@@ -103,6 +103,44 @@ TEST(MetricsTable, shows_unknown_keys_and_known_keys_of_another_kind) {
   EXPECT_FALSE(contains(html, "stages"));
 }
 
+TEST(MetricsTable, every_fitted_texture_has_a_row_with_its_texels_a_pixel) {
+  const std::string html = metrics_table(
+      {{"fit",
+        {{"density",
+          {{{"material", "Enamel <1>"}, {"width", 1024}, {"height", 512}, {"texels_per_pixel", 2.25}},
+           {{"material", "Rim"}, {"width", 64}, {"height", 64}, {"texels_per_pixel", 0.3}},
+           7}}}}});
+  EXPECT_TRUE(contains(html, "Texels a pixel, Enamel &lt;1&gt;"));
+  EXPECT_TRUE(contains(html, ">2.25<"));
+  EXPECT_TRUE(contains(html, "1024 × 512 texels"));
+  EXPECT_EQ(count(html, "class=\"good\""), 1u);
+  EXPECT_EQ(count(html, "class=\"poor\""), 1u);
+  EXPECT_EQ(count(html, "<tr>"), 3u);
+  EXPECT_FALSE(contains(html, "texels_per_pixel")) << "no JSON";
+}
+
+TEST(MetricsTable, facts_have_names_and_meanings_but_no_verdict) {
+  const std::string html = metrics_table({{"exposure_ev", -0.5},
+                                          {"model", "SD 1.5 architecture, bf16"},
+                                          {"guidance", {{"scale", 7.5}, {"negative_prompt", ""}}},
+                                          {"fit", {{"psnr_before", 14.2}}}});
+  EXPECT_TRUE(contains(html, "Exposure"));
+  EXPECT_TRUE(contains(html, "-0.5 EV"));
+  EXPECT_TRUE(contains(html, "14.2 dB"));
+  EXPECT_TRUE(contains(html, "class=\"text\" colspan=\"2\">SD 1.5 architecture"))
+      << "text lies in a cell that wraps";
+  EXPECT_FALSE(contains(html, "Guided away from")) << "of nothing";
+  EXPECT_FALSE(contains(html, "exposure_ev") || contains(html, "psnr_before") || contains(html, "guidance."));
+  EXPECT_EQ(count(html, "<small>good"), 0u);
+}
+
+TEST(MetricsTable, long_values_stand_in_cells_that_wrap) {
+  const std::string html =
+      metrics_table({{"notes", std::string(300, 'x')}, {"list", std::vector<int>(200, 7)}});
+  EXPECT_EQ(count(html, "<td class=\"text\" colspan=\"3\">"), 2u);
+  EXPECT_EQ(count(html, "<td class=\"value\">"), 0u) << "cells of numbers do not wrap";
+}
+
 TEST(MetricsTable, judges_nan_as_poor_and_never_as_good) {
   const std::string html = metrics_table({{"consistency", {{"edit_correlation", std::nan("")}}}});
   EXPECT_TRUE(contains(html, "n/a"));

@@ -43,7 +43,7 @@ constexpr std::array kMeasures{
             {0.7, 1},
             "90 % or more",
             "Share of the surface that at least one view sees. Unseen texels take the change around them, "
-            "smoothly, or keep their old values (--unseen)."},
+            "smoothly, or keep their old values (<code>--unseen</code>)."},
     Measure{
         "/consistency/edit_correlation",
         "Views agree, correlation",
@@ -141,7 +141,7 @@ constexpr Measure kDensity{"",
                            {0.5, kInfinity},
                            "1 or more",
                            "Along one side. Below 1 the views show more detail than the texture can hold; "
-                           "--texture-size auto makes it larger."};
+                           "<code>--texture-size auto</code> makes it larger."};
 
 // The number under `key`, or nullopt where there is none.
 std::optional<double> number_at(const json& object, const char* key) {
@@ -182,7 +182,7 @@ std::string plain_value(const json& value) {
 std::string row(const std::string& name, const std::string& value, const std::string& mark,
                 const std::string& meaning) {
   return fmt::format(
-      "<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td class=\"mark\">{}</td><td "
+      "<tr><th scope=\"row\">{}</th><td class=\"value\">{}</td><td class=\"verdict\">{}</td><td "
       "class=\"meaning\">{}</td></tr>\n",
       name, value, mark, meaning);
 }
@@ -206,8 +206,8 @@ std::string density_rows(const json& densities) {
     const std::string material = one.contains("material") ? plain_value(one["material"]) : "";
     rows += judged_row(
         kDensity, fmt::format("{}, {}", kDensity.name, material), *texels,
-        fmt::format("The texture has {} × {} texels. {}", number(number_at(one, "width").value_or(0)),
-                    number(number_at(one, "height").value_or(0)), kDensity.meaning));
+        fmt::format("The texture has {:.0f} × {:.0f} texels. {}", number_at(one, "width").value_or(0),
+                    number_at(one, "height").value_or(0), kDensity.meaning));
   }
   return rows;
 }

@@ -103,6 +103,7 @@ th { font-weight:500; }
 .stages .value:last-child { padding-right:0; }
 .metrics tbody th { width:22%; min-width:8rem; }
 .text { overflow-wrap:anywhere; }
+.meaning code { font-family:var(--mono); white-space:nowrap; }
 .meaning { color:var(--quiet); font-size:.875rem; width:45%; padding-right:0; }
 .metrics td small { display:block; }
 .good::before { content:"\25CF\2002"; color:var(--patina); }
@@ -135,10 +136,10 @@ footer { margin-top:3rem; color:var(--quiet); font-size:.8125rem; }
     gap:.35rem; }
   .metrics thead { display:none; }
   .metrics tr { display:grid; grid-template-columns:1fr auto; border-bottom:1px solid var(--line); }
-  .metrics th, .metrics td { width:auto; border-bottom:0; padding:.3rem 0; }
+  .metrics tbody th, .metrics td { width:auto; border-bottom:0; padding:.3rem 0; }
   .metrics .value { padding-left:1rem; }
-  .metrics .mark, .metrics .text, .metrics .meaning { grid-column:1/-1; }
-  .metrics .mark:empty, .metrics .meaning:empty { display:none; }
+  .metrics .verdict, .metrics .text, .metrics .meaning { grid-column:1/-1; }
+  .metrics .verdict:empty, .metrics .meaning:empty { display:none; }
 }
 
 /* Paper: white, always side by side. */

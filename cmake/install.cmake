@@ -1,0 +1,34 @@
+# Installation: headers, libraries, the program, the small model, and a CMake package, with which
+#   find_package(patina REQUIRED)
+#   target_link_libraries(my_program PRIVATE patina::patina)
+# works in a project of one's own (examples/render_and_fit).
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# All of the library under one name.
+add_library(patina_all INTERFACE)
+target_link_libraries(patina_all INTERFACE patina_pipeline)
+set_target_properties(patina_all PROPERTIES EXPORT_NAME patina)
+
+set(patina_libraries base image asset render views correspond attention nn diffusion inverse report pipeline)
+list(TRANSFORM patina_libraries PREPEND patina_)
+foreach(library options torch ${patina_libraries})
+  string(REGEX REPLACE "^patina_" "" name "${library}")
+  set_target_properties(patina_${name} PROPERTIES EXPORT_NAME ${name})
+endforeach()
+
+install(TARGETS patina_all patina_options patina_torch ${patina_libraries} EXPORT patina_targets
+  ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+install(TARGETS patina RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+install(DIRECTORY "${CMAKE_SOURCE_DIR}/src/patina" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
+  FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY "${CMAKE_SOURCE_DIR}/models/patina-mini" DESTINATION "${CMAKE_INSTALL_DATADIR}/patina/models")
+
+set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/patina")
+install(EXPORT patina_targets NAMESPACE patina:: FILE patina-targets.cmake DESTINATION "${package_folder}")
+configure_package_config_file("${CMAKE_CURRENT_LIST_DIR}/patina-config.cmake.in"
+  "${CMAKE_BINARY_DIR}/patina-config.cmake" INSTALL_DESTINATION "${package_folder}")
+# Before 1.0 a minor version may change the interface.
+write_basic_package_version_file("${CMAKE_BINARY_DIR}/patina-config-version.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${CMAKE_BINARY_DIR}/patina-config.cmake" "${CMAKE_BINARY_DIR}/patina-config-version.cmake"
+  DESTINATION "${package_folder}")
