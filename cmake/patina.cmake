@@ -39,17 +39,19 @@ if(PATINA_BUILD_BENCH)
 endif()
 
 add_library(patina_options INTERFACE)
-target_include_directories(patina_options INTERFACE "${CMAKE_SOURCE_DIR}/src")
+target_compile_features(patina_options INTERFACE cxx_std_20)
+target_include_directories(patina_options INTERFACE
+  "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/src>" "$<INSTALL_INTERFACE:include>")
 if(PATINA_CUDA)
-  target_include_directories(patina_options SYSTEM BEFORE INTERFACE "${CMAKE_BINARY_DIR}/include_first")
+  target_include_directories(patina_options SYSTEM BEFORE INTERFACE "$<BUILD_INTERFACE:${CMAKE_BINARY_DIR}/include_first>")
 endif()
 # GCC 12 sees overflows and overlaps in std::vector and std::string that are not there (its bugs 105329, 105651).
 set(options -Wno-stringop-overflow -Wno-restrict
   -march=${PATINA_ARCH} -Wall -Wextra -Wpedantic -Wshadow $<$<BOOL:${PATINA_WERROR}>:-Werror>)
-target_compile_options(patina_options INTERFACE "$<$<COMPILE_LANGUAGE:CXX>:${options}>"
-  "$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra;$<$<BOOL:${PATINA_WERROR}>:-Werror=all-warnings>>")
+target_compile_options(patina_options INTERFACE "$<BUILD_INTERFACE:$<$<COMPILE_LANGUAGE:CXX>:${options}>>"
+  "$<BUILD_INTERFACE:$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall,-Wextra;$<$<BOOL:${PATINA_WERROR}>:-Werror=all-warnings>>>")
 target_compile_definitions(patina_options INTERFACE GLM_FORCE_SILENT_WARNINGS GLM_ENABLE_EXPERIMENTAL
-  PATINA_VERSION="${PROJECT_VERSION}")
+  "$<BUILD_INTERFACE:PATINA_VERSION=\"${PROJECT_VERSION}\">")
 
 # Third-party headers are system headers: their warnings are not ours.
 add_library(patina_torch INTERFACE)

@@ -21,7 +21,8 @@
 //   views::render_views(scene, cameras, ...)   → ViewSet: renders, G-buffers and one exposure for all
 //   views::tile_control, views::normal_control the pictures that a diffusion model is conditioned on
 //   correspond::make_noise, bias_levels        what the views share: starting noise, corresponding pixels
-//   diffusion::Model                           edits the views: pictures and a prompt in, pictures out
+//   diffusion::Model(paths, options)           weights of a diffusion model
+//   diffusion::edit_views(model, inputs, ...)  pictures and a prompt in, edited pictures out
 //   inverse::fit_materials(scene, views, ...)  → FitResult: maps whose renders look like the edited views
 //   asset::export_asset(asset, maps, ...)      the same file with new textures
 //   report::write_report(path, data)           what was done, on one HTML page
@@ -48,7 +49,9 @@
 #include "patina/correspond/consistency.h"
 #include "patina/correspond/correspondences.h"
 #include "patina/correspond/noise.h"
-#include "patina/diffusion/detail.h"
+#include "patina/diffusion/edit.h"
+#include "patina/diffusion/model.h"
+#include "patina/diffusion/options.h"
 #include "patina/inverse/fit.h"
 
 // All of it in order, and what came of it.
