@@ -22,9 +22,8 @@ TEST(Srgb, is_continuous_and_monotonous_at_the_seam) {
   for (float v = 0.0f; v < 0.01f; v += 1e-5f) EXPECT_LT(srgb_from_linear(v), srgb_from_linear(v + 1e-5f));
 }
 
-TEST(Reinhard, inverse_and_derivative_agree_with_it) {
+TEST(Reinhard, derivative_agrees_with_central_differences) {
   for (const float v : {0.0f, 0.01f, 0.5f, 1.0f, 20.0f}) {
-    EXPECT_NEAR(inverse_reinhard(reinhard(v)), v, 1e-4f * (1 + v));
     const double h = 1e-3 * (1.0 + static_cast<double>(v));
     const auto exact = [](double x) { return x / (1.0 + x); };
     EXPECT_NEAR(d_reinhard(v), (exact(v + h) - exact(v - h)) / (2 * h), 1e-5);

@@ -1,4 +1,4 @@
-// Tiling views into a grid and cutting them apart.
+// Tiling views into a grid.
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -19,15 +19,16 @@ std::vector<Image> numbered_views(int count, int width, int height, int channels
   return views;
 }
 
-TEST(Grid, untile_is_the_inverse_of_tile) {
+TEST(Grid, every_view_lies_whole_in_its_tile) {
   for (const int grid : {1, 2, 3, 4}) {
     const auto views = numbered_views(grid * grid, 5, 3, 2);
     const Image tiled = tile_grid(views);
-    EXPECT_EQ(tiled.width, grid * 5);
-    EXPECT_EQ(tiled.height, grid * 3);
-    const auto again = untile_grid(tiled, grid);
-    ASSERT_EQ(again.size(), views.size());
-    for (size_t i = 0; i < views.size(); ++i) EXPECT_EQ(again[i].pixels, views[i].pixels);
+    ASSERT_EQ(tiled.width, grid * 5);
+    ASSERT_EQ(tiled.height, grid * 3);
+    for (int y = 0; y < tiled.height; ++y)
+      for (int x = 0; x < tiled.width; ++x)
+        for (int c = 0; c < 2; ++c)
+          ASSERT_EQ(tiled.at(x, y)[c], views[static_cast<size_t>(y / 3 * grid + x / 5)].at(x % 5, y % 3)[c]);
   }
 }
 
@@ -45,8 +46,6 @@ TEST(Grid, rejects_numbers_that_are_no_square_and_mixed_sizes) {
   auto views = numbered_views(4, 2, 2, 1);
   views[2] = Image(2, 3, 1);
   EXPECT_THROW(tile_grid(views), Error);
-  EXPECT_THROW(untile_grid(Image(7, 6, 1), 3), Error);
-  EXPECT_THROW(untile_grid(Image(6, 6, 1), 0), Error);
 }
 
 }  // namespace

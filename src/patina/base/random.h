@@ -16,7 +16,6 @@ enum class RandomPurpose : uint32_t {
   kIndependentNoise = 3,
   kSchedulerNoise = 4,
   kLightCache = 5,
-  kFit = 6,
   kGBuffer = 7,
   kTest = 100,
 };
@@ -39,9 +38,9 @@ std::array<float, 4> gaussian4(uint64_t seed, RandomPurpose purpose, uint64_t in
 class RandomStream {
  public:
   RandomStream(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sub_index = 0);
-  /// The stream of sample 0, 1, 2, … of `index`. Together they are spread evenly: the k-th draw of 2ⁿ samples has one in each
-  /// of 2ⁿ equal intervals, of a uniform2() also in each of 2ⁿ equal boxes of any shape. Sobol's first two dimensions, order
-  /// and digits scrambled anew for every draw [Burley2020].
+  /// The stream of sample 0, 1, 2, … of `index`. Together they are spread evenly: the k-th draw of 2ⁿ samples
+  /// has one in each of 2ⁿ equal intervals, of a uniform2() also in each of 2ⁿ equal boxes of any shape.
+  /// Sobol's first two dimensions, order and digits scrambled anew for every draw [Burley2020].
   static RandomStream even(uint64_t seed, RandomPurpose purpose, uint64_t index, uint32_t sample);
 
   float uniform();  ///< in [0,1)

@@ -18,10 +18,6 @@ Image linear_from_srgb(const Image& srgb);
 inline float reinhard(float radiance) {
   return radiance / (1.0f + radiance);
 }
-/// Its inverse, for values in [0,1).
-inline float inverse_reinhard(float value) {
-  return value / (1.0f - value);
-}
 /// Its derivative d reinhard / d radiance.
 inline float d_reinhard(float radiance) {
   return 1.0f / ((1.0f + radiance) * (1.0f + radiance));

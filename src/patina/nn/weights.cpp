@@ -66,17 +66,6 @@ at::Tensor read_tensor(const SafeTensors& file, const TensorEntry& entry, at::Sc
   return bytes.clone().view(stored).view(entry.shape).to(type);
 }
 
-at::Tensor FileWeights::find(const std::string& name, at::IntArrayRef, at::ScalarType type) {
-  const TensorEntry* entry = file_.find(name);
-  return entry ? read_tensor(file_, *entry, type) : at::Tensor();
-}
-
-std::vector<std::string> FileWeights::names() const {
-  std::vector<std::string> names;
-  for (const TensorEntry& entry : file_.tensors()) names.push_back(entry.name);
-  return names;
-}
-
 at::Tensor WeightReader::take(const std::string& name, std::vector<int64_t> shape, at::ScalarType type) {
   const at::Tensor tensor = source_.find(name, shape, type);
   if (!tensor.defined()) {

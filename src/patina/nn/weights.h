@@ -32,19 +32,6 @@ class WeightSource {
   virtual std::string stored_name(const std::string& name) const { return name; }
 };
 
-/// A weight file. `file` must outlive it, not the tensors.
-class FileWeights final : public WeightSource {
- public:
-  explicit FileWeights(const SafeTensors& file) : file_(file) {}
-  std::string where() const override { return file_.path().string(); }
-  bool has(const std::string& name) const override { return file_.find(name) != nullptr; }
-  at::Tensor find(const std::string& name, at::IntArrayRef expected, at::ScalarType type) override;
-  std::vector<std::string> names() const override;
-
- private:
-  const SafeTensors& file_;
-};
-
 /// What tensors become, and where.
 struct Placement {
   at::ScalarType type;

@@ -132,7 +132,7 @@ Render render(const Scene& scene, const Camera& camera, const PathOptions& optio
   PATINA_CHECK(camera.width > 0 && camera.height > 0);
   PATINA_CHECK_LT(0, options.samples_per_pixel);
   const int width = camera.width, height = camera.height, samples = options.samples_per_pixel;
-  Render out{Image(width, height, 3), Image(width, height, 1), Image(width, height, 3)};
+  Render out{Image(width, height, 3), Image(width, height, 1)};
 
   const CameraRays rays(camera);
   std::mutex progress_mutex;
@@ -140,8 +140,7 @@ Render render(const Scene& scene, const Camera& camera, const PathOptions& optio
   parallel_for(0, height, 1, [&](int64_t begin, int64_t end) {
     for (int y = static_cast<int>(begin); y < end; ++y) {
       for (int x = 0; x < width; ++x) {
-        // Sums in double: the variance of a bright, quiet pixel is a small difference of large numbers.
-        glm::dvec3 sum(0.0), sum_of_squares(0.0);
+        glm::dvec3 sum(0.0);
         double covered = 0;
         const auto pixel = static_cast<uint64_t>(y) * static_cast<uint64_t>(width) + static_cast<uint64_t>(x);
         for (int s = 0; s < samples; ++s) {
@@ -149,18 +148,11 @@ Render render(const Scene& scene, const Camera& camera, const PathOptions& optio
               RandomStream::even(options.seed, RandomPurpose::kPathTracing, pixel, static_cast<uint32_t>(s));
           const vec2 position = vec2(static_cast<float>(x), static_cast<float>(y)) + random.uniform2();
           float coverage = 0.0f;
-          const glm::dvec3 value(trace_path(scene, rays(position), options, random, &coverage));
-          sum += value;
-          sum_of_squares += value * value;
+          sum += glm::dvec3(trace_path(scene, rays(position), options, random, &coverage));
           covered += coverage;
         }
-        const glm::dvec3 mean = sum / static_cast<double>(samples);
-        out.radiance.set_rgb(x, y, vec3(mean));
+        out.radiance.set_rgb(x, y, vec3(sum / static_cast<double>(samples)));
         out.coverage.at(x, y)[0] = static_cast<float>(covered / samples);
-        if (samples > 1) {
-          const glm::dvec3 spread = glm::max(sum_of_squares - sum * mean, 0.0);
-          out.variance.set_rgb(x, y, vec3(spread / (static_cast<double>(samples) * (samples - 1))));
-        }
       }
       const std::lock_guard lock(progress_mutex);
       progress.throw_if_stopped();

@@ -1,4 +1,5 @@
-// Unidirectional path tracing with next-event estimation and multiple importance sampling by the balance heuristic [Veach1997].
+// Unidirectional path tracing with next-event estimation and multiple importance sampling by the balance
+// heuristic [Veach1997].
 #pragma once
 
 #include "patina/base/progress.h"
@@ -11,17 +12,21 @@ namespace patina::render {
 
 struct PathOptions {
   int samples_per_pixel = 64;
-  int max_depth = 6;               // path segments after the camera ray; 1 is direct light only
-  int roulette_depth = 3;          // Russian roulette from this depth on
+  int max_depth = 6;       // path segments after the camera ray; 1 is direct light only
+  int roulette_depth = 3;  // Russian roulette from this depth on
   uint64_t seed = 0;
-  bool show_environment = false;   // whether camera rays that hit nothing see the environment (else black)
+  bool show_environment = false;  // whether camera rays that hit nothing see the environment (else black)
 };
 
-/// Radiance that arrives along one ray, [3] linear; `coverage` (may be null) gets 1 where a surface was hit, else 0.
-vec3 trace_path(const Scene& scene, const Ray& ray, const PathOptions& options, RandomStream& random, float* coverage = nullptr);
+/// Radiance that arrives along one ray, [3] linear; `coverage` (may be null) gets 1 where a surface was hit,
+/// else 0.
+vec3 trace_path(const Scene& scene, const Ray& ray, const PathOptions& options, RandomStream& random,
+                float* coverage = nullptr);
 
-/// The same where it is known already what the ray meets first. For scenes without blended surfaces, where that is certain.
-vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const PathOptions& options, RandomStream& random);
+/// The same where it is known already what the ray meets first. For scenes without blended surfaces, where
+/// that is certain.
+vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const PathOptions& options,
+                     RandomStream& random);
 
 /// Both with other maps of the asset than the scene's own (Scene::surface).
 vec3 trace_path(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, const Ray& ray,
@@ -30,12 +35,10 @@ vec3 trace_path_from(const Scene& scene, std::span<const asset::MaterialMaps> as
                      const PathOptions& options, RandomStream& random);
 
 struct Render {
-  Image radiance;      // [H,W,3] linear HDR, premultiplied by coverage when the environment is not shown
-  Image coverage;      // [H,W,1] share of camera rays that hit a surface, [0,1]
-  Image variance;      // [H,W,3] sample variance / samples: of the pixel's mean were its samples independent; being spread evenly
-                       // (RandomStream::even), they vary less, so it is an upper bound
+  Image radiance;  // [H,W,3] linear HDR, premultiplied by coverage when the environment is not shown
+  Image coverage;  // [H,W,1] share of camera rays that hit a surface, [0,1]
 };
-Render render(const Scene& scene, const Camera& camera, const PathOptions& options, const Progress& progress = {},
-              std::string_view task = "render");
+Render render(const Scene& scene, const Camera& camera, const PathOptions& options,
+              const Progress& progress = {}, std::string_view task = "render");
 
 }  // namespace patina::render

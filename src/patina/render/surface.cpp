@@ -126,7 +126,6 @@ SurfacePoint Scene::surface(const Ray& ray, const Hit& hit,
   const vec3 n_map = maps.read3(material.normal);
   const vec3 n_mapped = normalized_or(n_map.x * tangent + n_map.y * bitangent + n_map.z * n, n);
   out.n_shading = visible_shading_normal(n_mapped, out.n_geometric, -ray.direction);
-  out.n_shading_moved = out.n_shading != n_mapped;
   return out;
 }
 

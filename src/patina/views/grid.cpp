@@ -1,4 +1,4 @@
-// Views tiled row by row into one square image, and cut apart again.
+// Views tiled row by row into one square image.
 #include <algorithm>
 #include <string>
 
@@ -37,27 +37,6 @@ Image tile_grid(std::span<const Image> views) {
                   out.at(x0, y0 + y));
   }
   return out;
-}
-
-std::vector<Image> untile_grid(const Image& grid_image, int grid) {
-  if (grid < 1 || grid_image.width % grid != 0 || grid_image.height % grid != 0) {
-    throw Error(ErrorCode::kUsage, "view grid",
-                "an image of " + std::to_string(grid_image.width) + " x " +
-                    std::to_string(grid_image.height) + " pixels cannot be cut into " + std::to_string(grid) +
-                    " x " + std::to_string(grid) + " views");
-  }
-  const int width = grid_image.width / grid, height = grid_image.height / grid;
-  std::vector<Image> views;
-  views.reserve(static_cast<size_t>(grid) * static_cast<size_t>(grid));
-  for (int row = 0; row < grid; ++row) {
-    for (int column = 0; column < grid; ++column) {
-      Image& view = views.emplace_back(width, height, grid_image.channels);
-      for (int y = 0; y < height; ++y)
-        std::copy_n(grid_image.at(column * width, row * height + y),
-                    static_cast<size_t>(width) * static_cast<size_t>(grid_image.channels), view.at(0, y));
-    }
-  }
-  return views;
 }
 
 }  // namespace patina::views

@@ -60,8 +60,8 @@ struct OrbitOptions {
 std::vector<render::Camera> orbit_cameras(const asset::Bounds& bounds, const OrbitOptions& options);
 
 /// The same around an asset. Where the distance is 0, every view has the asset in its middle, and all cameras
-/// stand as near as lets all vertices lie a 32nd of the side inside all views, though never nearer than half as
-/// far as for the bounding sphere.
+/// stand as near as lets all vertices lie a 32nd of the side inside all views, though never nearer than half
+/// as far as for the bounding sphere.
 std::vector<render::Camera> orbit_cameras(const asset::Asset& asset, const OrbitOptions& options);
 
 GBuffer make_gbuffer(const render::Scene& scene, const render::Camera& camera);
@@ -103,8 +103,7 @@ Image normal_control(const View& view);
 /// Views a side of a grid of `num_views`. Throws Error{kUsage} unless it is a square number.
 int grid_of(size_t num_views);
 
-/// Tiles grid × grid images of one size row by row, and cuts them apart again.
+/// Tiles grid × grid images of one size row by row.
 Image tile_grid(std::span<const Image> views);
-std::vector<Image> untile_grid(const Image& grid_image, int grid);
 
 }  // namespace patina::views
