@@ -99,7 +99,7 @@ Asset read_asset(const std::filesystem::path& path);
 /// size.
 struct Bounds {
   vec3 min, max;
-  float sphere_radius = 0;   // of the smallest sphere about center() that holds every vertex; 0: not known
+  float sphere_radius = 0;  // of the smallest sphere about center() that holds every vertex; 0: not known
   vec3 center() const { return 0.5f * (min + max); }
   /// Radius of a sphere about center() that holds everything: never larger than half the box's diagonal.
   float radius() const { return sphere_radius > 0 ? sphere_radius : 0.5f * glm::length(max - min); }

@@ -1,5 +1,5 @@
-// Cuts queries into blocks of 64 lanes and lists each block's biased keys: what the CPU and CUDA kernels share.
-// Private to attention.
+// Cuts queries into blocks of 64 lanes and lists each block's biased keys: what the CPU and CUDA kernels
+// share. Private to attention.
 #pragma once
 
 #include <cstdint>

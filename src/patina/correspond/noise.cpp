@@ -117,8 +117,9 @@ std::vector<NoiseField> make_noises(const render::Scene& scene, std::span<const 
 
 uint64_t block_seed(uint64_t seed, int block) {
   if (block == 0) return seed;
-  const auto bits = philox({static_cast<uint32_t>(block), 0, 0, static_cast<uint32_t>(RandomPurpose::kNoiseField)},
-                           {static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32)});
+  const auto bits =
+      philox({static_cast<uint32_t>(block), 0, 0, static_cast<uint32_t>(RandomPurpose::kNoiseField)},
+             {static_cast<uint32_t>(seed), static_cast<uint32_t>(seed >> 32)});
   return bits[0] | static_cast<uint64_t>(bits[1]) << 32;
 }
 

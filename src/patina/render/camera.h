@@ -1,4 +1,5 @@
-// A pinhole camera. Right-handed, looks along -Z of its own frame, +Y up; pixels from the top left, centres at +0.5.
+// A pinhole camera. Right-handed, looks along -Z of its own frame, +Y up; pixels from the top left, centres
+// at +0.5.
 #pragma once
 
 #include <limits>
@@ -16,16 +17,17 @@ struct Ray {
 };
 
 struct Camera {
-  mat4 world_from_camera{1.0f};   // rigid: rotation and translation only
-  float fov_y = 0.6f;             // full vertical angle, radians
-  int width = 0, height = 0;      // pixels
+  mat4 world_from_camera{1.0f};  // rigid: rotation and translation only
+  float fov_y = 0.6f;            // full vertical angle, radians
+  int width = 0, height = 0;     // pixels
 
   vec3 position() const { return vec3(world_from_camera[3]); }
   /// Distance from the eye to the image plane, in pixels.
   float focal_pixels() const { return 0.5f * static_cast<float>(height) / std::tan(0.5f * fov_y); }
   /// The ray through continuous pixel coordinates.
   Ray ray(const vec2& pixel) const;
-  /// Continuous pixel coordinates of a world point and its depth along the viewing axis (metres); nullopt behind the eye.
+  /// Continuous pixel coordinates of a world point and its depth along the viewing axis (metres); nullopt
+  /// behind the eye.
   struct Projection {
     vec2 pixel;
     float depth;
@@ -33,7 +35,8 @@ struct Camera {
   std::optional<Projection> project(const vec3& p_world) const;
 };
 
-/// The rays of one camera, which must outlive it; the tangent of the field of view is taken once for all of them.
+/// The rays of one camera, which must outlive it; the tangent of the field of view is taken once for all of
+/// them.
 class CameraRays {
  public:
   explicit CameraRays(const Camera& camera) : camera_(camera), focal_(camera.focal_pixels()) {}

@@ -33,7 +33,8 @@ GBuffer empty_gbuffer(int width, int height) {
   return out;
 }
 
-// The base colour, and a dielectric's gloss, between rough and smooth: so a black object does not seem to stand in the dark.
+// The base colour, and a dielectric's gloss, between rough and smooth: so a black object does not seem to
+// stand in the dark.
 float reflectance_of(const render::BsdfParams& bsdf) {
   constexpr float kGloss = 0.025f;
   const float base = luminance(bsdf.base_color);

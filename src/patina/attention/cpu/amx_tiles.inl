@@ -27,8 +27,7 @@ struct TileProducts {
   static constexpr int kTileKeys = 96, kKeyStep = 32;
   int head_dim, steps, values_tiles;
 
-  explicit TileProducts(int dim)
-      : head_dim(dim), steps(score_steps(dim)), values_tiles(value_tiles(dim)) {}
+  explicit TileProducts(int dim) : head_dim(dim), steps(score_steps(dim)), values_tiles(value_tiles(dim)) {}
 
   /// Writes whole groups of 32 keys: rows past `tile` hold scores of zero keys and are not read.
   void scores(const Block& block, int64_t key0, int tile, float* s) const {
@@ -66,7 +65,8 @@ struct TileProducts {
     const int columns = (block.num_lanes + 15) / 16;
     for (int row = 0; row < head_dim; row += 16) {
       for (int lane = 0; lane < block.num_lanes; lane += 16) {
-        const char* v = static_cast<const char*>(block.v) + (key0 / 32 * values_tiles + row / 16) * kTileBytes;
+        const char* v =
+            static_cast<const char*>(block.v) + (key0 / 32 * values_tiles + row / 16) * kTileBytes;
         _tile_zero(0);
         for (int j = 0; j < tile; j += 32, v += values_tiles * kTileBytes) {
           _tile_loadd(4, v, 64);

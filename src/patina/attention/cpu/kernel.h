@@ -37,7 +37,7 @@ struct Block {
   float beta = 0;                     // β · log2 e
   const BiasedKey* biased = nullptr;  // ascending keys, ended by one with key = INT32_MAX
   uint64_t immoderate_lanes = 0;      // kBf16Tiles: lanes with a query, or all if a key or value is, NaN,
-                                  // infinite or beyond kModerate
+                                      // infinite or beyond kModerate
   float* state = nullptr;  // what a kernel that takes panels keeps of the block between them, 64-byte aligned
   float* scratch = nullptr;  // [kTileKeysMax][64] f32 and [kTileKeysMax][64] bf16 behind it, 64-byte aligned
   float* out = nullptr;      // [d₁₆][64] f32, divided by the sum; written with the last panel, as is
