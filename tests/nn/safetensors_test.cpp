@@ -88,8 +88,8 @@ TEST(SafeTensors, refuses_malformed_headers_and_says_why) {
       {R"({"w":{"shape":[2],"data_offsets":[0,8]}})", 8, "no dtype"},
       {R"({"w":7})", 8, "tensor 'w' is a number, expected an object"},
       {"[1]", 0, "does not begin with '{'"},
-      {"{" + w + "} trailing", 8, "no valid JSON"},
-      {"{\"w\xC0\x80\":{}}", 0, "no valid JSON"},
+      {"{" + w + "} trailing", 8, "not valid JSON"},
+      {"{\"w\xC0\x80\":{}}", 0, "not valid JSON"},
       {R"({"w":)" + std::string(200'000, '['), 0, "tensor 'w' is an array"},
   };
   for (const Malformed& c : cases) {

@@ -150,7 +150,7 @@ class HeaderParser : public nlohmann::json_sax<nlohmann::json> {
   bool parse_error(size_t position, const std::string&, const nlohmann::json::exception& error) override {
     // Overflowing numbers and bad UTF-8 arrive here too; the text behind the last ';' or ']' of the library
     // is the reason.
-    return fail("the header is no valid JSON at byte " + std::to_string(position) + ": " +
+    return fail("the header is not valid JSON at byte " + std::to_string(position) + ": " +
                 printable(error.what(), 160));
   }
 
@@ -297,16 +297,16 @@ SafeTensors::SafeTensors(const std::filesystem::path& path) {
   if (header_bytes > kMaxHeaderBytes) {
     fail(path, "gives its header " + std::to_string(header_bytes) +
                    " bytes, more than the format's limit of " + std::to_string(kMaxHeaderBytes) +
-                   ": it is no safetensors file or damaged");
+                   ": it is not a safetensors file, or it is damaged");
   }
   if (header_bytes > bytes.size() - 8) {
     fail(path, "gives its header " + std::to_string(header_bytes) + " bytes, but only " +
-                   std::to_string(bytes.size() - 8) + " follow: it is truncated or no safetensors file");
+                   std::to_string(bytes.size() - 8) + " follow: it is truncated, or not a safetensors file");
   }
   const std::span<const uint8_t> header = bytes.subspan(8, header_bytes);
   const std::span<const uint8_t> data = bytes.subspan(8 + header_bytes);
   if (header.empty() || header.front() != '{')
-    fail(path, "its header does not begin with '{': it is no safetensors file or damaged");
+    fail(path, "its header does not begin with '{': it is not a safetensors file, or it is damaged");
 
   HeaderParser parser;
   if (!nlohmann::json::sax_parse(header.begin(), header.end(), &parser)) fail(path, parser.fault);
