@@ -11,7 +11,7 @@ packages=(
   libembree-dev libtbb-dev            # ray casting, threads
   libopenimageio-dev libwebp-dev zlib1g-dev   # image files, animated turntables, PNG checksums
   libutf8proc-dev                     # characters of prompts: classes, lower case, composition
-  nlohmann-json3-dev libglm-dev libcli11-dev libspdlog-dev libxxhash-dev
+  nlohmann-json3-dev libglm-dev libcli11-dev libfmt-dev libxxhash-dev
   libgtest-dev libbenchmark-dev
 )
 if [[ "${1:-}" == "--bench" ]]; then packages+=(blender python3-numpy); fi

@@ -1,5 +1,7 @@
 // Installs patina into a folder of its own, as a packager would, and uses what lies there as others would: a
-// program that finds the CMake package, and the installed program itself.
+// program that finds the CMake package, a plug-in that is a shared library, the installed program itself.
+#include <dlfcn.h>
+
 #include <gtest/gtest.h>
 
 #include "patina/asset/material_maps.h"
@@ -54,6 +56,16 @@ TEST_F(Install, the_example_program_finds_the_package_and_gives_an_asset_new_tex
   };
   const vec3 before = mean_color(kettle()), after = mean_color(output);
   EXPECT_LT(after.r / after.g, 0.8f * before.r / before.g) << "the pictures were tinted green";
+}
+
+TEST_F(Install, a_plug_in_is_linked_from_the_static_libraries_and_works) {
+  const fs::path binary = folder_->path() / "plugin";
+  build(fs::path(PATINA_SOURCE_DIR) / "tests" / "install" / "plugin", binary);
+  void* plugin = ::dlopen((binary / "libplugin.so").c_str(), RTLD_NOW | RTLD_LOCAL);
+  ASSERT_NE(plugin, nullptr) << ::dlerror();
+  const auto num_materials = reinterpret_cast<int (*)(const char*)>(::dlsym(plugin, "num_materials_of"));
+  ASSERT_NE(num_materials, nullptr);
+  EXPECT_GT(num_materials(kettle().c_str()), 0);
 }
 
 TEST_F(Install, the_program_runs_from_its_place_and_the_small_model_lies_beside_it) {
