@@ -89,11 +89,11 @@ std::string changed_library(const std::string& text, std::map<std::string, State
   size_t at = 0;
   std::vector<std::string> replaced;  // keywords that the current material gets anew
   for (const TextLine& line : text_lines(text)) {
-    if (lower(line.keyword) == "newmtl") {
+    if (lowered(line.keyword) == "newmtl") {
       replaced.clear();
       const auto found = by_material.find(line.rest);
       if (found == by_material.end()) continue;
-      for (const auto& [keyword, unused] : found->second) replaced.push_back(lower(keyword));
+      for (const auto& [keyword, unused] : found->second) replaced.push_back(lowered(keyword));
       const size_t next = std::min(line.end + 1, text.size());
       out.append(text, at, next - at);
       if (!out.ends_with('\n')) out += '\n';
