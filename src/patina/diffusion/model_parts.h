@@ -19,9 +19,9 @@ namespace patina::diffusion {
 /// A text encoder and what belongs to it alone.
 struct TextPart {
   TextEncoderPart encoder;
-  std::filesystem::path tokenizer;
-  std::optional<int64_t> pad_id;  // where the family wants another than the tokenizer's files say
-  std::vector<LearnedWord> words;
+  std::filesystem::path tokenizer = {};
+  std::optional<int64_t> pad_id = {};  // where the family wants another than the tokenizer's files say
+  std::vector<LearnedWord> words = {};
 };
 
 struct ModelParts {
