@@ -7,17 +7,22 @@
 // much fine detail conflicting views leave; and it is fitted with more and fewer views, pixels and texels, to
 // see what each costs. Both at half the resolution.
 //
-//   bench_inverse [--shared ../shared] [--resolution 512] [--samples 128] [--iterations 200] [--only NAME]
+// Part `aged` (aged.h): fits from clean assets to aged ones, judged under other light as well.
+//
+//   bench_inverse [--part known|aged] [--shared ../shared] [--resolution 512] [--samples 128]
+//                 [--iterations 200] [--only NAME]
 //                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
+#include "aged.h"
 #include "export_scene.h"
 #include "path_replay_fit.h"
 #include "patina/base/files.h"
@@ -44,7 +49,7 @@ constexpr int kReplayPaths = 8;  // a pixel: as many as the cache keeps directio
 
 struct Options {
   fs::path shared = "../shared", out = "build/bench/inverse.json", pictures = "build/bench/inverse";
-  std::string only;
+  std::string only, part = "known";
   test::RecoveryOptions recovery;
 };
 
@@ -178,6 +183,43 @@ void stack_strips(const fs::path& folder) {
   write_image(folder / "all_views.png", all);
 }
 
+json to_json(const bench::AgedErrors& errors) {
+  return {{"normal_degrees", errors.normal_degrees},   {"normal_correlation", errors.normal_correlation},
+          {"base_color_psnr", errors.base_color_psnr}, {"roughness_mae", errors.roughness_mae},
+          {"metallic_right", errors.metallic_right},   {"relit_psnr", errors.relit_psnr}};
+}
+
+void run_aged(const Options& options) {
+  bench::AgedOptions aged_options;
+  aged_options.shared = options.shared;
+  aged_options.resolution = options.recovery.resolution;
+  aged_options.samples = options.recovery.samples_per_pixel;
+  aged_options.fit = options.recovery.fit;
+  json all = json::array();
+  for (const bench::Ageing& ageing : bench::ageings()) {
+    if (!options.only.empty() && options.only != ageing.name) continue;
+    const bench::Aged aged = bench::age_and_fit(ageing, aged_options);
+    const bench::AgedErrors start = aged_errors(aged, aged_options, aged.start),
+                            found = aged_errors(aged, aged_options, aged.fit.maps);
+    std::printf(
+        "%-14s normals %.1f -> %.1f deg (correlation %.2f), base colour %.1f -> %.1f dB, roughness %.3f -> "
+        "%.3f, metallic right %.2f, relit %.2f -> %.2f dB, %.1f s\n",
+        ageing.name, start.normal_degrees, found.normal_degrees, found.normal_correlation,
+        start.base_color_psnr, found.base_color_psnr, start.roughness_mae, found.roughness_mae,
+        found.metallic_right, start.relit_psnr, found.relit_psnr, aged.fit_seconds);
+    std::fflush(stdout);
+    all.push_back({{"name", ageing.name},
+                   {"start", to_json(start)},
+                   {"found", to_json(found)},
+                   {"fit_psnr", aged.fit.psnr},
+                   {"seconds", aged.fit_seconds}});
+    fs::create_directories(options.pictures);
+    write_image(options.pictures / (std::string(ageing.name) + ".png"), aged_picture(aged, aged_options));
+  }
+  if (all.empty()) throw std::runtime_error("no ageing is called " + options.only);
+  write_file(options.out, all.dump(1) + "\n");
+}
+
 void run(const Options& options) {
   const json settings{{"resolution", options.recovery.resolution},
                       {"samples", options.recovery.samples_per_pixel},
@@ -248,6 +290,8 @@ int main(int argc, char** argv) {
       options.pictures = value;
     else if (flag == "--only" && !value.empty())
       options.only = value;
+    else if (flag == "--part" && (value == "known" || value == "aged"))
+      options.part = value;
     else if (flag == "--resolution" && number > 0)
       options.recovery.resolution = number;
     else if (flag == "--samples" && number > 0)
@@ -257,13 +301,16 @@ int main(int argc, char** argv) {
     else {
       std::fprintf(
           stderr,
-          "usage: bench_inverse [--shared DIR] [--resolution 512] [--samples 128] [--iterations 200] "
-          "[--only NAME] [--out FILE] [--pictures DIR]\n");
+          "usage: bench_inverse [--part known|aged] [--shared DIR] [--resolution 512] [--samples 128] "
+          "[--iterations 200] [--only NAME] [--out FILE] [--pictures DIR]\n");
       return 2;
     }
   }
   try {
-    run(options);
+    if (options.part == "aged")
+      run_aged(options);
+    else
+      run(options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_inverse: %s\n", error.what());
     return 1;
