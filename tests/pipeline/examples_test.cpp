@@ -24,8 +24,11 @@ std::vector<Example> examples_of(const fs::path& page) {
   std::vector<Example> examples;
   std::istringstream lines(read_text_file(page));
   int number = 0;
+  bool fenced = false;
   for (std::string line; std::getline(lines, line);) {
     ++number;
+    if (line.starts_with("```")) fenced = !fenced;
+    if (!fenced && !line.starts_with("    ")) continue;
     for (std::string rest; line.ends_with('\\') && std::getline(lines, rest); ++number)
       line = line.substr(0, line.size() - 1) + rest;
     std::smatch match;
@@ -80,7 +83,7 @@ TEST(Examples, of_help_texts_are_understood) {
 TEST(Examples, several_values_are_taken_before_and_after_the_asset) {
   const std::string kettle = (data_dir().parent_path().parent_path() / "examples" / "kettle.glb").string();
   const std::string rest = " -p moss -m none -o out.glb";
-  for (const std::string& several :
+  for (const std::string several :
        {"--elevation -20 20 50", "--elevation 20,50", "--elevation 20 --elevation 50",
         "--fit base_color roughness normal metallic", "--fit base_color,roughness", "--material enamel wood",
         "--material enamel,wood", "--lora a:0.5 b", "--elevation 10 --fit normal"}) {
