@@ -74,11 +74,11 @@ TEST_F(Tree, gives_every_part_by_name) {
   EXPECT_EQ(parts.vae.table.where.filename(), "soft.safetensors");
   EXPECT_EQ(parts.controlnets[0].table.where.filename(), "control_tile_fp16.safetensors");
   EXPECT_EQ(parts.controlnets[1].table.where.filename(), "control_normalbae.safetensors");
-  EXPECT_EQ(parts.tokenizer, root() / "comfy" / "sd1_tokenizer");
+  EXPECT_EQ(parts.texts[0].tokenizer, root() / "comfy" / "sd1_tokenizer");
   EXPECT_FALSE(parts.loras.unet.empty());
-  ASSERT_EQ(parts.words.size(), 1u);
-  EXPECT_EQ(parts.words[0].word, "rusted");
-  EXPECT_EQ(parts.words[0].count, 3);
+  ASSERT_EQ(parts.texts[0].words.size(), 1u);
+  EXPECT_EQ(parts.texts[0].words[0].word, "rusted");
+  EXPECT_EQ(parts.texts[0].words[0].count, 3);
   // What tells whether the model changed: five networks' files, the LoRA, the embedding and the tokenizer's.
   EXPECT_GE(parts.files.size(), 8u);
 }
@@ -86,7 +86,7 @@ TEST_F(Tree, gives_every_part_by_name) {
 TEST_F(Tree, a_checkpoint_in_it_brings_the_others_along) {
   const ModelParts parts = find_model_parts({checkpoint(), {}, {}, {}});
   EXPECT_EQ(parts.controlnets[0].table.where.filename(), "control_tile_fp16.safetensors");
-  EXPECT_EQ(parts.tokenizer, root() / "comfy" / "sd1_tokenizer");
+  EXPECT_EQ(parts.texts[0].tokenizer, root() / "comfy" / "sd1_tokenizer");
 }
 
 TEST_F(Tree, what_is_missing_is_told_with_what_to_do) {
@@ -161,7 +161,7 @@ TEST_F(Tree, sd2_without_a_sign_must_be_asked) {
   make::write_controlnet(models() / "controlnet" / "normal_sd2.safetensors", sd2, make::Layout::kLdm, true);
   const ModelParts parts = find_model_parts(by_name("two"));
   EXPECT_TRUE(parts.ask_prediction);
-  EXPECT_EQ(parts.pad_id, 0);
+  EXPECT_EQ(parts.texts[0].pad_id, 0);
   EXPECT_EQ(parts.controlnets[0].table.where.filename(), "a_tile_for_sd2.safetensors");
   EXPECT_FALSE(find_model_parts(by_name("dream")).ask_prediction);
 }
