@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <regex>
 #include <set>
 #include <sstream>
 #include <string>
@@ -187,6 +188,31 @@ TEST(Layering, benchmarks_and_tests_compile_nothing_of_each_other) {
   for (const char* folder : {"bench", "tools", "mini/bench_mini", "mini/make_dataset", "mini/train_mini"})
     check(folder, "tests/");
   check("tests", "bench/");
+}
+
+// A library is a guest in its host's process: it starts no program, ends nothing, prints nothing, and leaves
+// the process's memory and thread settings to main(). Comments may speak of these calls.
+TEST(Layering, the_library_does_nothing_that_only_a_program_may) {
+  const std::regex banned(
+      R"((^|[^\w.>])((std)?::)?(execv\w*|fork|system|_?exit|quick_exit|abort|terminate|setenv|putenv|signal|)"
+      R"(sigaction|malloc_trim|printf|fprintf|puts|putchar)\s*\()"
+      R"(|std::c(out|err|log)\b|fmt::print|clear_refs|/proc/self/exe|at::set_num)");
+  // The one function through which a program sets the threads of both pools.
+  const fs::path allowed = kRoot / "src" / "patina" / "nn" / "threads.cpp";
+  int num_checked = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(kRoot / "src" / "patina")) {
+    const fs::path& path = entry.path();
+    if (!entry.is_regular_file() || path == allowed) continue;
+    if (path.extension() != ".h" && path.extension() != ".cpp" && path.extension() != ".inl") continue;
+    std::istringstream text(read_text_file(path));
+    std::string line;
+    for (int number = 1; std::getline(text, line); ++number) {
+      const std::string code = line.substr(0, line.find("//"));
+      EXPECT_FALSE(std::regex_search(code, banned)) << path.string() << ':' << number << ": " << line;
+      ++num_checked;
+    }
+  }
+  EXPECT_GT(num_checked, 10000) << "the scan found too little to mean anything";
 }
 
 TEST(Layering, the_rule_has_no_circles) {
