@@ -65,7 +65,7 @@ class Writer:
         (folder / "schedulers").mkdir(parents=True, exist_ok=True)
 
     def __call__(self, name, tensors, **metadata):
-        tensors = {key: value.detach().contiguous() for key, value in tensors.items()}
+        tensors = {key: value.detach().clone().contiguous() for key, value in tensors.items()}
         save_file(tensors, str(self.folder / (name + ".safetensors")), metadata=metadata or None)
         self.index[name] = {
             "tensors": {key: [str(value.dtype).removeprefix("torch."), list(value.shape)] for key, value in tensors.items()},
@@ -138,8 +138,8 @@ def make_text(write, encoder, tokenizer):
     skipped = encoder.text_model.final_layer_norm(out.hidden_states[-2])
     write("text_encoder", {"input_ids": ids, "last_hidden_state": out.last_hidden_state, "pooler_output": out.pooler_output,
                            "clip_skip_2": skipped}, prompts=json.dumps(PROMPTS))
-    acts = Activations(encoder, lambda path: path.startswith("text_model.") and path.count(".") <= 5
-                       and not path.endswith(("layers", "activation_fn", "token_embedding", "position_embedding")))
+    acts = Activations(encoder, lambda path: path in ("text_model.embeddings", "text_model.final_layer_norm")
+                       or path.startswith("text_model.encoder.layers.") and not path.endswith("activation_fn"))
     out = encoder(ids[:1])
     write("text_encoder_acts", {"input_ids": ids[:1], "last_hidden_state": out.last_hidden_state, **acts.close()})
     return out.last_hidden_state
@@ -286,12 +286,13 @@ def make_schedulers(write):
         tensors |= {run + "/timesteps": timesteps.double(), run + "/noisy": noisy, run + "/latents": latents}
         runs[run] = {"t_start": first, "num_timesteps": len(timesteps)}
         write("schedulers/" + name, tensors)
-        config = {key: value for key, value in scheduler.config.items() if not key.startswith("_")}
+        # lambda_min_clipped is -inf, which JSON does not know.
+        config = {key: value for key, value in scheduler.config.items() if not key.startswith("_") and value != -math.inf}
         index[name] = {"class": kind, "config": config, "overrides": settings, "runs": runs, "file": name + ".safetensors"}
     (write.folder / "schedulers" / "index.json").write_text(json.dumps(index, indent=1, default=str))
 
 
-def make_run(write, model, parts, tokenizer, encoder, unet, vae, controlnets):
+def make_run(write, model, versions, tokenizer, encoder, unet, vae, controlnets):
     """Image to image with both ControlNets, classifier-free guidance and DDIM, as StableDiffusionControlNetImg2ImgPipeline does."""
     steps, strength, guidance, prompt, negative = 6, 0.8, 7.5, PROMPTS[0], PROMPTS[2]
     config = json.loads((model / "scheduler" / "scheduler_config.json").read_text())
@@ -329,7 +330,7 @@ def make_run(write, model, parts, tokenizer, encoder, unet, vae, controlnets):
            **{"noise_pred_" + key: torch.stack(value) for key, value in predictions.items()}, "latents": torch.stack(latents),
            "final_latents": latent, "decoded": decoded, "decoded_01": decoded_01, "decoded_u8": (decoded_01 * 255).round().to(torch.uint8)},
           prompt=prompt, negative_prompt=negative, guidance_scale=str(guidance), steps=str(steps), strength=str(strength),
-          controlnet_scales=",".join(str(scale) for scale in CONTROLNETS.values()), scheduler="DDIM leading steps_offset=1", parts=parts)
+          controlnet_scales=",".join(str(scale) for scale in CONTROLNETS.values()), scheduler="DDIM leading steps_offset=1", made_by=versions)
 
 
 @torch.no_grad()
