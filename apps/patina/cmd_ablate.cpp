@@ -60,10 +60,10 @@ void add_ablate(CLI::App& program) {
   const auto own = std::make_shared<Own>();
   constexpr size_t kMany = CLI::detail::expected_max_vector_size;
   command
-      ->add_option(
-          "-o,--output", own->output,
-          "Folder for ablation.html, ablation.json and a run folder a step. The same command continues a "
-          "killed one there.")
+      ->add_option("-o,--output", own->output,
+                   "Folder for ablation.html, ablation.json and a run folder for each step. The same command "
+                   "continues a "
+                   "killed one there.")
       ->type_name("FOLDER")
       ->group("Input and output");
   command->add_option("--weights", own->weights, "Attention bias w of the last steps. [0.6,1.2,1.8,2.4]")
@@ -87,7 +87,7 @@ void add_ablate(CLI::App& program) {
       ->group("Comparison");
   command
       ->add_flag("--no-fit", own->no_fit,
-                 "Compare the edited views alone; without, each step is carried into textures too, which "
+                 "Compare only the edited views; otherwise each step is carried into textures too, which "
                  "takes longer.")
       ->group("Comparison");
   const auto point = add_point_options(*command, "Comparison");

@@ -8,7 +8,7 @@ namespace patina::app {
 
 void add_info(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "info", "Tell what an asset, image, environment or weight file holds and whether patina can use it.");
+      "info", "Say what an asset, image, environment or weight file holds and whether patina can use it.");
   auto path = std::make_shared<std::string>();
   command->add_option("FILE", *path, ".glb .gltf .obj .png .jpg .hdr .exr .safetensors")
       ->required()

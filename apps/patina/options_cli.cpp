@@ -25,7 +25,7 @@ std::string all_names(const pipeline::Option& option) {
 // Values stay text here: the pipeline's list parses them, the same way wherever they come from.
 void add_option(CLI::App& command, const pipeline::Option& option, GivenOptions& given) {
   GivenOptions::Item& item = given.items.emplace_back(GivenOptions::Item{.name = option.name});
-  // const, since CLI11 takes a string that it may change for the variable that the option shall fill.
+  // const, because CLI11 takes a string that it may change for the variable that the option fills.
   const std::string names = all_names(option),
                     help = option.default_text.empty()
                                ? option.help
@@ -127,7 +127,7 @@ void find_positional(GivenOptions& given) {
 void require_prompt(const pipeline::Config& config) {
   if (config.edit.options.prompt.empty())
     throw Error(ErrorCode::kUsage, "prompt",
-                "say what the asset shall look like, e.g. --prompt \"a rusty old kettle\"");
+                "say what the asset should look like, e.g. --prompt \"a rusty old kettle\"");
 }
 
 }  // namespace patina::app

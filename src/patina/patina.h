@@ -5,11 +5,11 @@
 //   find_package(patina REQUIRED)
 //   target_link_libraries(my_program PRIVATE patina::patina)
 //
-// examples/render_and_fit is a whole program. The library prints nothing, starts nothing and ends nothing. It
+// examples/render_and_fit is a whole program. The library prints nothing and starts or ends no process. It
 // reports through Progress, fails by throwing Error, and depends on no global state but the number of
 // threads, which the program sets. No header below includes LibTorch.
 //
-// The whole way, as `patina enhance` goes it:
+// A whole run, as `patina enhance` does it:
 //   pipeline::enhance(config, run, progress)   every stage that has to run; the results in a run folder
 //
 // Step by step:

@@ -1,4 +1,4 @@
-// Options of the edit: what it shall look like, and what keeps the views consistent.
+// Options of the edit: what the asset should look like, and what keeps the views consistent.
 #include "patina/pipeline/option_groups.h"
 #include "patina/pipeline/option_kinds.h"
 
@@ -61,14 +61,14 @@ std::vector<Option> edit_options() {
           {.name = "prompt",
            .aliases = {"-p"},
            .placeholder = "TEXT",
-           .help = "What the asset shall look like, e.g. \"a rusty old kettle\"."},
+           .help = "What the asset should look like, e.g. \"a rusty old kettle\"."},
           text(), [](auto& s) -> auto& { return s.options.prompt; }),
       option(
           at,
           {.name = "negative-prompt",
            .aliases = {"-n"},
            .placeholder = "auto|TEXT",
-           .help = "What it shall not look like. auto takes the words that the model brings (patina-mini: "
+           .help = "What it should not look like. auto takes the model's own words (patina-mini: "
                    "\"a clean new object\", so that only what the prompt says beyond that acts), or none.",
            .default_text = "auto"},
           optional_or_word("auto", text()), [](auto& s) -> auto& { return s.options.negative_prompt; }),
@@ -76,7 +76,7 @@ std::vector<Option> edit_options() {
           at,
           {.name = "strength",
            .placeholder = "S",
-           .help = "How far the views may move away from the renders: the share of the steps that is run, "
+           .help = "How much the views may change: the share of the steps that is run, "
                    "0.01 to 1."},
           number(0.01f, 1.0f), [](auto& s) -> auto& { return s.options.strength; }),
       option(
@@ -97,10 +97,7 @@ std::vector<Option> edit_options() {
            .help = "Steps of the scheduler. Steps × strength of them are run."},
           integer(1, 1000), [](auto& s) -> auto& { return s.options.num_steps; }),
       option(
-          at,
-          {.name = "scheduler",
-           .aliases = {"--sampler"},
-           .help = "How the noise is taken away step by step."},
+          at, {.name = "scheduler", .aliases = {"--sampler"}, .help = "How noise is removed step by step."},
           scheduler(), [](auto& s) -> auto& { return s.options.scheduler; }),
       option(
           at,
@@ -147,8 +144,8 @@ std::vector<Option> prior_options() {
           at,
           {.name = "bias-scaling",
            .help = "additive adds w to the scaled scores. paper adds it before they are divided by the "
-                   "square root of the head dimension, as the paper's formula does; there it acts about "
-                   "six times less."},
+                   "square root of the head dimension, as the paper's formula does; its effect is about "
+                   "six times smaller then."},
           choice<BiasScaling>({{"additive", BiasScaling::kAdditive}, {"paper", BiasScaling::kPaper}}),
           [](auto& s) -> auto& { return s.options.bias_scaling; }),
       option(

@@ -94,7 +94,7 @@ std::vector<Option> fit_options() {
       option(
           at,
           {.name = "keep-in-place",
-           .help = "Take the edited views as they lie. Otherwise a view that disagrees with the others is "
+           .help = "Take the edited views as they are. Otherwise a view that disagrees with the others is "
                    "moved smoothly by up to 8 pixels, so that detail stays sharp."},
           truth(), [](auto& s) -> auto& { return s.options.keep_in_place; }),
   };

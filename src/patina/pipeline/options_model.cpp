@@ -84,7 +84,7 @@ std::vector<Option> model_options() {
           at,
           {.name = "tokenizer",
            .placeholder = "DIR",
-           .help = "Folder with CLIP's merges.txt and vocab.json, for checkpoints that bring none.",
+           .help = "Folder with CLIP's merges.txt and vocab.json, for checkpoints without one.",
            .default_text = "the model's own, else searched (docs/models.md)"},
           path(), [](auto& s) -> auto& { return s.model.tokenizer; }),
       list_option(

@@ -84,7 +84,7 @@ std::vector<Option> input_output_options() {
                   kOutput, &Config::output),
       path_of_run({.name = "run",
                    .placeholder = "DIR",
-                   .help = "Run folder: everything in between, kept. The same command continues a killed run "
+                   .help = "Folder for everything in between. The same command continues a killed run "
                            "there.",
                    .default_text = "beside the output, OUT.patina-run"},
                   kInputs, &Config::run),

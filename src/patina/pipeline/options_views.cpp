@@ -97,8 +97,8 @@ std::vector<Option> view_options() {
           at,
           {.name = "distance",
            .placeholder = "METRES",
-           .help = "From the asset's centre to the cameras, metres. 0 goes as near as lets every view hold "
-                   "the whole asset."},
+           .help = "From the asset's centre to the cameras, metres. 0 goes as near as possible with the "
+                   "whole asset in every view."},
           number(0.0f, 1e12f), [](auto& s) -> auto& { return s.orbit.distance; }),
       option(
           at,
@@ -112,7 +112,7 @@ std::vector<Option> view_options() {
           at,
           {.name = "environment",
            .placeholder = "FILE.hdr",
-           .help = "Light from around: an equirectangular .hdr or .exr.",
+           .help = "Environment light: an equirectangular .hdr or .exr.",
            .default_text = "built-in studio"},
           path(), [](auto& s) -> auto& { return s.environment; }),
       option(

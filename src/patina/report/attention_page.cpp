@@ -133,7 +133,7 @@ void write_attention_page(const std::filesystem::path& path, const AttentionPage
                with = share_of(figure.with, figure.biased_keys);
   const char* titles[] = {"Correspondences", "Attention without bias", "Attention with bias"};
   const std::string captions[] = {
-      fmt::format("<span class=\"query\">Green</span>: the latent pixel that asks. <span "
+      fmt::format("<span class=\"query\">Green</span>: the latent pixel of the query. <span "
                   "class=\"key\">Red</span>: the {} "
                   "that see the same surface in other views.",
                   figure.biased_keys.size()),

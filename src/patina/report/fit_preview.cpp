@@ -46,7 +46,7 @@ void write_fit_preview(const std::filesystem::path& path, const FitPreviewPage& 
   const Image views = pairs_of_views(page);
   html += page_section(
       "The views",
-      "Above what the model made, below what the textures show so far, with the noise of few samples.",
+      "Above: what the model made. Below: what the textures show so far, with the noise of few samples.",
       picture(views, std::max(views.width, views.height), "edited views above, fitted ones below"));
   html += page_section("Loss", "", loss_plot(page.loss));
   const bool is_finished = static_cast<int>(page.loss.size()) >= page.iterations;

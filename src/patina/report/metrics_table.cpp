@@ -127,7 +127,7 @@ constexpr std::array kFacts{
         "The same as the fit itself saw it: with few light samples a pixel, and with views moved toward each "
         "other."},
     Fact{"/exposure_ev", "Exposure", Unit::kEv, "Of all views, from radiance to what is shown and edited."},
-    Fact{"/guidance/scale", "Guidance", Unit::kNone, "How strongly the prompt pulls; 1 is no guidance."},
+    Fact{"/guidance/scale", "Guidance", Unit::kNone, "How strongly the prompt acts; 1 is no guidance."},
     Fact{"/guidance/negative_prompt", "Guided away from", Unit::kNone, "The negative prompt."},
     Fact{"/model", "Diffusion model", Unit::kNone, "Architecture, size and precision."},
 };
