@@ -113,7 +113,9 @@ TEST(Progress, json_tells_stages_progress_previews_warnings_and_the_result) {
       EXPECT_TRUE(event.at("seconds_left").is_null() || event.at("seconds_left").get<double>() >= 0);
       EXPECT_FALSE(event.at("stage").get<std::string>().empty()) << event;
     }
-    if (event.at("event") == "preview") EXPECT_TRUE(fs::exists(event.at("file").get<std::string>()));
+    if (event.at("event") == "preview") {
+      EXPECT_TRUE(fs::exists(event.at("file").get<std::string>())) << event;
+    }
   }
   EXPECT_EQ(stages, (std::vector<std::string>{"render started", "render finished", "detail started",
                                               "detail finished", "fit started", "fit finished",
