@@ -16,7 +16,7 @@ struct Photographs {
 struct AskedClass {
   std::string name;
   std::vector<std::string> prompts;      // with {} where the object's name goes
-  std::vector<Photographs> photographs;  // empty: no photograph shows it; it is told by its recipes alone
+  std::vector<Photographs> photographs;  // empty: no photograph shows it; only its recipes define it
   std::vector<std::string> recipes;      // of mini_data: names of age_names() or clean_names()
 };
 

@@ -17,14 +17,14 @@ struct JudgedView {
 };
 
 /// Scores of the asked classes, most likely first. Every window on the object votes with its probabilities,
-/// and its vote weighs as much as its colour changed (ΔE up to kFullChange): where nothing happened, nothing
-/// is told of the prompt. Windows that look untouched vote for no asked class.
+/// and its vote weighs as much as its colour changed (ΔE up to kFullChange): a window that did not change says
+/// nothing about the prompt. Windows that look untouched vote for no asked class.
 inline constexpr float kFullChange = 30.0f;
 inline constexpr float kTemperature = 3.0f;
 struct Ranking {
   std::vector<int> classes;   // into asked_classes(), all of them
   std::vector<float> scores;  // [classes], in the order of asked_classes(); sums to at most 1
-  /// 0 for the first place; behind all that score as much, so that an edit of nothing reaches no place.
+  /// 0 for the first place; behind all others with the same score, so that an unchanged view ranks last.
   int place_of(int asked) const;
 };
 Ranking judge_edit(const Discriminant& classifier, std::span<const JudgedView> views);

@@ -65,7 +65,7 @@ const char* names_text(const TensorTable& table) {
   }
 }
 
-/// Checks a network and tells of it in one line.
+/// Checks a network and describes it in one line.
 template <class Config>
 std::string checked(const NetworkPart<Config>& part) {
   check_tensors(part);

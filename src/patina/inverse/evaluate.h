@@ -1,5 +1,5 @@
-// One look at the light cache: loss of the current textures and its gradient with respect to every fitted
-// map.
+// One evaluation of the light cache: loss of the current textures and its gradient with respect to every
+// fitted map.
 #pragma once
 
 #include <array>

@@ -24,8 +24,8 @@ struct FitOptions {
   float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
   int light_samples = 8;        // incident directions kept a pixel
   int max_depth = 4;            // of the paths that gather incident light
-  int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that count nothing
-  bool fill_unseen = true;      // texels that no view saw get the change around them (unseen.h)
+  int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that do not count
+  bool fill_unseen = true;      // unseen texels get the change around them (unseen.h)
   bool keep_in_place = false;   // do not move views that disagree toward each other (alignment.h)
   uint64_t seed = 0;
 };

@@ -27,7 +27,7 @@ struct FittedMap {
 
 /// `base` with every fitted map's change added, clamped, normals renormalised. Texels that must not change
 /// keep base's exact value. kIslands: the change goes on beyond the texels that the views saw, so that no mip
-/// level shows a seam; between iterations nobody looks there.
+/// level shows a seam; not needed between iterations.
 enum class Padding { kNone, kIslands };
 std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::MaterialMaps>& base,
                                                std::span<const FittedMap> fitted, Padding padding);

@@ -1,4 +1,4 @@
-// What becomes of surface that no view saw: it gets the change that the views brought to the surface near it,
+// Unseen texels: they get the change that the views made to the surface near them,
 // so that a rusty kettle has no clean bottom. Only smooth change can be carried over; the original's own
 // detail stays under it.
 #pragma once

@@ -1,4 +1,4 @@
-// What `patina info` tells of a file: an asset, an image, an environment map or a file of weights.
+// What `patina info` says about a file: an asset, an image, an environment map or a file of weights.
 #pragma once
 
 #include <filesystem>

@@ -18,7 +18,7 @@ using nlohmann::json;
 
 namespace {
 
-// Below this many texels a pixel the user is told that a larger texture would hold more.
+// Below this many texels a pixel a note says that a larger texture would hold more.
 constexpr float kTooCoarse = 0.5f;
 
 // A material's name as part of a file name: letters, digits, '-', '_'; numbered, so that two materials never

@@ -136,7 +136,7 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
     return measure_result(bench, views, edited, fitted, settings, run, progress);
   });
 
-  // The page is made anew every time: it is cheap, and tells of stages that ran again.
+  // The page is made anew every time: it is cheap, and shows stages that ran again.
   report::ReportData page;
   page.title = bench.asset.path.filename().string();
   const Prompts prompts = prompts_of(run);
