@@ -17,8 +17,8 @@ struct JudgedView {
 };
 
 /// Scores of the asked classes, most likely first. Every window on the object votes with its probabilities,
-/// and its vote weighs as much as its colour changed (ΔE up to kFullChange): a window that did not change says
-/// nothing about the prompt. Windows that look untouched vote for no asked class.
+/// and its vote weighs as much as its colour changed (ΔE up to kFullChange): a window that did not change
+/// says nothing about the prompt. Windows that look untouched vote for no asked class.
 inline constexpr float kFullChange = 30.0f;
 inline constexpr float kTemperature = 3.0f;
 struct Ranking {
