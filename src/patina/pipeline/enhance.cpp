@@ -101,7 +101,7 @@ fs::path run_folder_path(const Config& config) {
 
 void write_config(const Config& config, RunFolder& run) {
   const fs::path file = run.file("config.json"), asset = fs::absolute(config.inputs.asset);
-  const std::string hash = hash_file(asset);
+  const std::string hash = hash_file(config.inputs.asset);
   if (fs::exists(file)) {
     const json before = read_json(file);
     if (before.value("asset", "") != asset.string() && before.value("asset_hash", "") != hash) run.clear();

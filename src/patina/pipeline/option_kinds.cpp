@@ -17,7 +17,9 @@ Kind<float> number_in_units(float low, float high, float (*inside)(float), float
 }  // namespace
 
 void refuse(const Option& option, const json& found) {
-  const std::string text = found.is_string() ? found.get<std::string>() : found.dump();
+  const std::string text = found.is_string()         ? found.get<std::string>()
+                           : found.is_number_float() ? fmt::format("{}", found.get<float>())
+                                                     : found.dump();
   throw Error(ErrorCode::kUsage, option.name,
               fmt::format("expected {}, found '{}'", option.expected, printable(text)));
 }
