@@ -10,6 +10,7 @@
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/check_model.h"
+#include "patina/diffusion/files/families.h"
 #include "patina/diffusion/files/infer_config.h"
 #include "patina/diffusion/files/network_part.h"
 #include "patina/diffusion/files/recognise.h"
