@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
 #include "patina/base/error.h"
@@ -188,6 +189,92 @@ TEST(Hdr, real_environment_maps_have_the_stated_means) {
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(sum[k] / static_cast<double>(map.num_pixels()), c.mean[k], 0.006);
     EXPECT_NEAR(largest, c.largest, 0.6f);
   }
+}
+
+// ---- environments with layers and infinite pixels
+
+TEST(Hdr, the_combined_layer_is_taken_whatever_stands_before_it) {
+  const HdrImage hdr = read_hdr_with_notes(test::data_dir() / "cases/env/layers_ao_first.exr");
+  vec3 mean(0.0f);
+  for (int y = 0; y < hdr.image.height; ++y)
+    for (int x = 0; x < hdr.image.width; ++x)
+      mean += hdr.image.rgb(x, y) / static_cast<float>(hdr.image.num_pixels());
+  EXPECT_LT(glm::length(mean - vec3(0.68f, 0.63f, 0.58f)), 0.02f);
+  ASSERT_EQ(hdr.notes.size(), 1u);
+  EXPECT_NE(hdr.notes[0].find("'ViewLayer.Combined' is taken"), std::string::npos);
+}
+
+TEST(Hdr, infinite_pixels_become_the_largest_finite_value) {
+  const HdrImage hdr = read_hdr_with_notes(test::data_dir() / "cases/env/infinite_sun.exr");
+  float largest = 0;
+  for (const float value : hdr.image.pixels) {
+    ASSERT_TRUE(std::isfinite(value));
+    largest = std::max(largest, value);
+  }
+  EXPECT_EQ(largest, 65504.0f);
+  EXPECT_EQ(hdr.notes.size(), 1u);
+
+  const TemporaryFolder folder;
+  Image image(2, 1, 3, 3.0f);
+  image.set_rgb(1, 0,
+                vec3(std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(), 1));
+  write_image(folder.path() / "float.exr", image);
+  EXPECT_EQ(read_hdr(folder.path() / "float.exr").rgb(1, 0), vec3(3, 0, 1));
+  image.set_rgb(1, 0, vec3(std::numeric_limits<float>::quiet_NaN()));
+  write_image(folder.path() / "nan.exr", image);
+  EXPECT_THROW(read_hdr(folder.path() / "nan.exr"), Error);
+}
+
+// An EXR of 1 x 1 pixel; channel i holds i + 1.
+std::filesystem::path exr_with(const std::filesystem::path& folder,
+                               const std::vector<std::string>& channels) {
+  const auto path = folder / "layers.exr";
+  OIIO::ImageSpec spec(1, 1, static_cast<int>(channels.size()), OIIO::TypeDesc::FLOAT);
+  spec.channelnames = channels;
+  std::vector<float> values;
+  for (size_t i = 0; i < channels.size(); ++i) values.push_back(static_cast<float>(i + 1));
+  const auto output = OIIO::ImageOutput::create(path.string());
+  EXPECT_TRUE(output && output->open(path.string(), spec) &&
+              output->write_image(OIIO::TypeDesc::FLOAT, values.data()) && output->close());
+  return path;
+}
+
+TEST(Hdr, layers_are_chosen_by_name_or_named) {
+  const TemporaryFolder folder;
+  const auto red = [&](const std::vector<std::string>& channels) {
+    return read_hdr(exr_with(folder.path(), channels)).rgb(0, 0).r;
+  };
+  EXPECT_EQ(red({"a.R", "a.G", "a.B", "R", "G", "B"}), 4.0f);          // the plain one
+  EXPECT_EQ(red({"Depth.Z", "Image.R", "Image.G", "Image.B"}), 2.0f);  // the only one with colours
+  EXPECT_EQ(red({"A.Noise.R", "A.Noise.G", "A.Noise.B", "A.Combined.A", "A.Combined.B", "A.Combined.G",
+                 "A.Combined.R"}),
+            7.0f);
+  try {
+    red({"one.R", "one.G", "one.B", "two.R", "two.G", "two.B"});
+    ADD_FAILURE() << "was read";
+  } catch (const Error& e) {
+    EXPECT_NE(e.message().find("'one', 'two'"), std::string::npos) << e.message();
+  }
+  EXPECT_THROW(red({"U", "V"}), Error);
+  // A render with many passes.
+  std::vector<std::string> many{"R", "G", "B"};
+  for (int i = 0; i < 100; ++i) many.push_back("pass" + std::to_string(i) + ".V");
+  EXPECT_EQ(red(many), 1.0f);
+}
+
+TEST(Files, mime_types_are_told_by_content) {
+  const auto type = [](std::string_view bytes) {
+    return mime_type({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()});
+  };
+  using namespace std::string_view_literals;
+  EXPECT_EQ(type("RIFF\1\0\0\0WEBPVP8 "sv), "image/webp");
+  EXPECT_EQ(type("\xABKTX 20\xBB\r\n\x1A\n"sv), "image/ktx2");
+  EXPECT_EQ(type("\0\0\0\x1C\x66typavif\0\0\0\0"sv), "image/avif");
+  EXPECT_EQ(type("\0\0\0\x20\x66typmif1\0\0\0\0mif1avifmiaf"sv), "image/avif");
+  EXPECT_EQ(type("DDS |\0\0\0"sv), "image/vnd-ms.dds");
+  EXPECT_EQ(type("RIFF\1\0\0\0WAVEfmt "sv), "");
+  EXPECT_EQ(type("GIF89a"sv), "");
+  EXPECT_EQ(type(""sv), "");
 }
 
 TEST(Files, formats_are_told_by_content_and_errors_name_the_file) {

@@ -1,25 +1,17 @@
 #include "patina/base/error.h"
 
+#include "patina/base/utf8.h"
+
 namespace patina {
 namespace {
 
-// Length of the valid UTF-8 sequence at `text[i]`, or 0: overlong forms, surrogates and C1 controls are
-// refused too.
-size_t utf8_length(std::string_view text, size_t i) {
-  const auto byte = [&](size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
-  const auto follows = [&](size_t k) { return (byte(k) & 0xC0u) == 0x80u; };
-  const unsigned b = byte(i);
-  if (b < 0x80) return b >= 0x20 && b != 0x7F ? 1 : 0;
-  if (b >= 0xC2 && b <= 0xDF && follows(i + 1)) return b == 0xC2 && byte(i + 1) < 0xA0 ? 0 : 2;
-  if (b >= 0xE0 && b <= 0xEF && follows(i + 1) && follows(i + 2)) {
-    if ((b == 0xE0 && byte(i + 1) < 0xA0) || (b == 0xED && byte(i + 1) > 0x9F)) return 0;
-    return 3;
-  }
-  if (b >= 0xF0 && b <= 0xF4 && follows(i + 1) && follows(i + 2) && follows(i + 3)) {
-    if ((b == 0xF0 && byte(i + 1) < 0x90) || (b == 0xF4 && byte(i + 1) > 0x8F)) return 0;
-    return 4;
-  }
-  return 0;
+// Length of the UTF-8 sequence at `text[i]` that a terminal may be given: controls (C0, C1, DEL) give 0 too.
+size_t printable_length(std::string_view text, size_t i) {
+  const auto byte = static_cast<unsigned char>(text[i]);
+  if (byte < 0x20 || byte == 0x7F) return 0;
+  const size_t length = utf8_length(text, i);
+  const bool is_c1 = byte == 0xC2 && length == 2 && static_cast<unsigned char>(text[i + 1]) < 0xA0;
+  return is_c1 ? 0 : length;
 }
 
 std::string assemble(std::string_view context, std::string_view message) {
@@ -33,7 +25,7 @@ std::string printable(std::string_view text, size_t max_length) {
   std::string out;
   for (size_t i = 0; i < text.size();) {
     if (out.size() >= max_length) return out + "...";
-    if (const size_t n = utf8_length(text, i)) {
+    if (const size_t n = printable_length(text, i)) {
       out.append(text.substr(i, n));
       i += n;
     } else {

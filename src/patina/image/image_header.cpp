@@ -303,6 +303,22 @@ std::optional<ImageFormat> image_format(Bytes bytes) {
   return std::nullopt;
 }
 
+std::string_view mime_type(Bytes bytes) {
+  if (starts_with(bytes, "\x89PNG\r\n\x1A\n")) return "image/png";
+  if (starts_with(bytes, "\xFF\xD8\xFF")) return "image/jpeg";
+  if (starts_with(bytes, "RIFF") && bytes.size() >= 12 && starts_with(bytes.subspan(8), "WEBP"))
+    return "image/webp";
+  if (starts_with(bytes, "\xABKTX 20\xBB")) return "image/ktx2";
+  if (starts_with(bytes, "DDS ")) return "image/vnd-ms.dds";
+  if (bytes.size() >= 12 && starts_with(bytes.subspan(4), "ftyp")) {
+    // The major brand, or a compatible one, is avif (or avis, a sequence).
+    const std::string_view box(reinterpret_cast<const char*>(bytes.data()),
+                               std::min<size_t>(bytes.size(), 64));
+    if (box.find("avif") != box.npos || box.find("avis") != box.npos) return "image/avif";
+  }
+  return {};
+}
+
 ImageHeader inspect_image(Bytes bytes, const std::string& name, const ImageLimits& limits) {
   const auto format = image_format(bytes);
   if (format == ImageFormat::kPng) return inspect_png(bytes, name, limits);

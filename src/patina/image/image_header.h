@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "patina/image/image_io.h"
 
@@ -23,6 +24,10 @@ struct ImageHeader {
 
 /// The format that the first bytes announce; file names and mime types are not asked.
 std::optional<ImageFormat> image_format(std::span<const uint8_t> bytes);
+
+/// MIME type of an image file's bytes, for the kinds that glTF and its extensions hold: PNG, JPEG, WebP, KTX
+/// 2, AVIF, DDS; empty for any other.
+std::string_view mime_type(std::span<const uint8_t> bytes);
 
 /// Reads and checks the structure of a PNG [PNG, Sec. 5 and 11] or JPEG [JPEG, Annex B] file: chunks or
 /// markers in order and whole, a size within `limits` that the compressed bytes could hold. Throws

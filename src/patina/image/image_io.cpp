@@ -1,6 +1,7 @@
 #include "patina/image/image_io.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
 
@@ -11,6 +12,7 @@
 #include "patina/base/check.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/image/image_header.h"
 
 namespace patina {
@@ -24,7 +26,7 @@ void configure_oiio() {
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
     OIIO::attribute("limits:imagesize_MB", 2048);
-    OIIO::attribute("limits:channels", 64);
+    OIIO::attribute("limits:channels", 1024);  // a render with many passes
   });
 }
 
@@ -75,6 +77,14 @@ struct Decoder {
                               spec.height, spec.nchannels, header.width, header.height));
   }
 
+  // One channel of all pixels.
+  std::vector<float> plane(int channel, const std::string& name) {
+    std::vector<float> out(static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height));
+    if (!input->read_image(0, 0, channel, channel + 1, OIIO::TypeDesc::FLOAT, out.data()))
+      throw Error(ErrorCode::kFormat, name, "the image cannot be decoded: " + last_error(input->geterror()));
+    return out;
+  }
+
   template <class T>
   std::vector<T> pixels(OIIO::TypeDesc type, int num_channels, const std::string& name) {
     std::vector<T> out(static_cast<size_t>(spec.width) * static_cast<size_t>(spec.height) *
@@ -106,6 +116,100 @@ Image to_unit_range(const std::vector<T>& stored, int width, int height, int cha
   std::transform(stored.begin(), stored.end(), image.pixels.begin(),
                  [](T v) { return static_cast<float>(v) / kMaximum; });
   return image;
+}
+
+// ---- layers and values of environments
+// --------------------------------------------------------------------------------
+
+// Which channels of a file are red, green and blue.
+struct ChannelChoice {
+  std::array<int, 3> channels;
+  std::string note;
+};
+
+// A layer: what stands before the last dot of its channels' names.
+struct Layer {
+  std::string name;
+  std::array<int, 3> rgb{-1, -1, -1};
+  bool is_color() const { return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0; }
+};
+
+std::vector<Layer> color_layers(const std::vector<std::string>& channels) {
+  constexpr std::array<std::array<std::string_view, 2>, 3> kNames = {
+      {{"r", "red"}, {"g", "green"}, {"b", "blue"}}};
+  std::vector<Layer> layers;
+  for (size_t i = 0; i < channels.size(); ++i) {
+    const size_t dot = channels[i].rfind('.');
+    const std::string prefix = dot == std::string::npos ? "" : channels[i].substr(0, dot);
+    const std::string channel = lowered(channels[i].substr(dot == std::string::npos ? 0 : dot + 1));
+    auto layer = std::find_if(layers.begin(), layers.end(), [&](const Layer& l) { return l.name == prefix; });
+    if (layer == layers.end()) layer = layers.insert(layers.end(), Layer{prefix});
+    for (size_t c = 0; c < 3; ++c)
+      if (channel == kNames[c][0] || channel == kNames[c][1]) layer->rgb[c] = static_cast<int>(i);
+  }
+  std::erase_if(layers, [](const Layer& l) { return !l.is_color(); });
+  return layers;
+}
+
+// How renderers call the layer that is the picture.
+bool is_picture(const Layer& layer) {
+  const std::string last = lowered(layer.name.substr(layer.name.rfind('.') + 1));
+  return last == "combined" || last == "beauty" || last == "rgba" || last == "rgb" || last == "composite";
+}
+
+ChannelChoice choose_channels(const std::vector<std::string>& channels, const std::string& name) {
+  if (channels.size() == 1) return {{0, 0, 0}, ""};
+  const std::vector<Layer> layers = color_layers(channels);
+  std::string names;
+  for (const Layer& layer : layers)
+    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(layer.name, 60));
+  if (layers.empty()) {
+    for (const std::string& channel : channels)
+      if (names.size() < 200) names += (names.empty() ? "" : ", ") + printable(channel, 60);
+    throw Error(ErrorCode::kUnsupported, name,
+                fmt::format("an environment map needs channels R, G and B or a single one, found {}", names));
+  }
+  const auto plain =
+      std::find_if(layers.begin(), layers.end(), [](const Layer& l) { return l.name.empty(); });
+  if (plain != layers.end()) return {plain->rgb, ""};
+  if (layers.size() == 1) return {layers[0].rgb, ""};
+  const auto picture = std::find_if(layers.begin(), layers.end(), is_picture);
+  if (picture == layers.end())
+    throw Error(ErrorCode::kUnsupported, name,
+                fmt::format("the EXR file has the layers {} and none called Combined; save the one that "
+                            "shall light the asset as a file of its own",
+                            names));
+  return {picture->rgb,
+          fmt::format("{}: of its layers {}, '{}' is taken", name, names, printable(picture->name, 60))};
+}
+
+constexpr float kLargestHalf = 65504.0f;
+
+// Brings infinite values to `largest` (0: to the largest finite value of the image) and negative ones to
+// zero.
+void make_finite(HdrImage& hdr, float largest, const std::string& name) {
+  std::vector<float>& pixels = hdr.image.pixels;
+  const auto width = static_cast<size_t>(hdr.image.width);
+  if (largest == 0.0f)
+    for (const float value : pixels)
+      if (std::isfinite(value)) largest = std::max(largest, value);
+  size_t num_infinite = 0, last_infinite = SIZE_MAX;
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    const size_t pixel = i / 3;
+    if (std::isnan(pixels[i]))
+      throw Error(ErrorCode::kFormat, name,
+                  fmt::format("pixel ({}, {}) is not a number; an environment map must be finite",
+                              pixel % width, pixel / width));
+    if (std::isinf(pixels[i]) && pixel != last_infinite) {
+      ++num_infinite;
+      last_infinite = pixel;
+    }
+    pixels[i] = std::isinf(pixels[i]) ? (pixels[i] > 0 ? largest : 0.0f) : std::max(pixels[i], 0.0f);
+  }
+  if (num_infinite > 0)
+    hdr.notes.push_back(
+        fmt::format("{}: {} pixel(s) are infinite and are brought to the largest finite value, {}", name,
+                    num_infinite, largest));
 }
 
 // Encodes through OpenImageIO into memory.
@@ -165,32 +269,29 @@ Image read_image(const std::filesystem::path& path, const ImageLimits& limits) {
   return decode_image(MappedFile(path).bytes(), path.string(), limits);
 }
 
-Image read_hdr(const std::filesystem::path& path, const ImageLimits& limits) {
+HdrImage read_hdr_with_notes(const std::filesystem::path& path, const ImageLimits& limits) {
   configure_oiio();
   const MappedFile file(path);
   const std::string name = path.string();
   const ImageHeader header = inspect_hdr(file.bytes(), name, limits);
   return decoding(name, [&] {
     Decoder decoder(file.bytes(), header, name);
-    const int stored_channels = decoder.spec.nchannels;
-    if (stored_channels != 1 && stored_channels < 3)
-      throw Error(ErrorCode::kUnsupported, name,
-                  fmt::format("an environment map needs 1, 3 or 4 channels, found {}", stored_channels));
-    const int used = stored_channels == 1 ? 1 : 3;
-    const std::vector<float> stored = decoder.pixels<float>(OIIO::TypeDesc::FLOAT, used, name);
-    Image image(header.width, header.height, 3);
-    for (size_t i = 0; i < image.num_pixels(); ++i)
-      for (size_t c = 0; c < 3; ++c) {
-        const float value = stored[i * static_cast<size_t>(used) + (used == 3 ? c : 0)];
-        if (!std::isfinite(value))
-          throw Error(
-              ErrorCode::kFormat, name,
-              fmt::format("pixel ({}, {}) is not a finite number; an environment map must be finite",
-                          i % static_cast<size_t>(header.width), i / static_cast<size_t>(header.width)));
-        image.pixels[3 * i + c] = std::max(value, 0.0f);
-      }
-    return image;
+    const ChannelChoice choice = choose_channels(decoder.spec.channelnames, name);
+    HdrImage out;
+    if (!choice.note.empty()) out.notes.push_back(choice.note);
+    out.image = Image(header.width, header.height, 3);
+    for (size_t c = 0; c < 3; ++c) {
+      const std::vector<float> plane = decoder.plane(choice.channels[c], name);
+      for (size_t i = 0; i < plane.size(); ++i) out.image.pixels[3 * i + c] = plane[i];
+    }
+    const bool is_half = decoder.spec.format == OIIO::TypeDesc::HALF;
+    make_finite(out, is_half ? kLargestHalf : 0.0f, name);
+    return out;
   });
+}
+
+Image read_hdr(const std::filesystem::path& path, const ImageLimits& limits) {
+  return read_hdr_with_notes(path, limits).image;
 }
 
 std::vector<uint8_t> encode_png(const Image& image) {

@@ -27,8 +27,17 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, cons
 /// Reads a PNG or JPEG file the same way.
 Image read_image(const std::filesystem::path& path, const ImageLimits& limits = {});
 
-/// Reads an HDR (Radiance) or EXR equirectangular map: linear Rec. 709 [H,W,3]. A single channel is taken
-/// as grey; values that are not finite are refused (the error names the pixel), negative ones become zero.
+/// An environment, and what a user should know of how it was read.
+struct HdrImage {
+  Image image;  // [H,W,3] linear Rec. 709, finite, not negative
+  std::vector<std::string> notes;
+};
+
+/// Reads an HDR (Radiance) or EXR equirectangular map. A single channel is taken as grey; of an EXR with
+/// layers the plain one or Combined is taken, else the layers are named in an error. Infinite values (a sun
+/// that half floats cannot hold) are brought to the largest finite one, negative ones to zero; NaN is refused
+/// (the error names the pixel).
+HdrImage read_hdr_with_notes(const std::filesystem::path& path, const ImageLimits& limits = {});
 Image read_hdr(const std::filesystem::path& path, const ImageLimits& limits = {});
 
 /// Encodes to 8-bit PNG (1 to 4 channels, values clamped to [0,1], rounded to nearest), deterministic bytes.
