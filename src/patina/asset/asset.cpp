@@ -33,7 +33,10 @@ Asset read_gltf(const std::filesystem::path& path, std::vector<uint8_t> file) {
 }  // namespace
 
 Asset read_asset(const std::filesystem::path& path) {
-  std::vector<uint8_t> file = read_file(path);
+  return read_asset(path, read_file(path));
+}
+
+Asset read_asset(const std::filesystem::path& path, std::vector<uint8_t> file) {
   if (is_glb(file)) return read_gltf(path, std::move(file));
   // A glTF file is a JSON object; OBJ has no line that begins with a brace or bracket.
   const auto is_space = [](uint8_t c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
@@ -46,6 +49,15 @@ Asset read_asset(const std::filesystem::path& path) {
   if (extension == ".glb")
     throw Error(ErrorCode::kFormat, path.string(), "the file does not begin with 'glTF', so it is no GLB");
   throw Error(ErrorCode::kFormat, path.string(), "is neither glTF, GLB nor OBJ");
+}
+
+void set_origin(Asset& asset, const glm::dvec3& origin) {
+  const glm::dvec3 shift = asset.origin - origin;
+  asset.origin = origin;
+  if (shift == glm::dvec3(0.0)) return;
+  for (Primitive& primitive : asset.primitives)
+    for (vec3& p : primitive.p_world) p = vec3(glm::dvec3(p) + shift);
+  for (Light& light : asset.lights) light.p_world = vec3(glm::dvec3(light.p_world) + shift);
 }
 
 Bounds bounds(const Asset& asset) {
@@ -74,6 +86,43 @@ Bounds bounds(const Asset& asset) {
   return box;
 }
 
+namespace {
+
+// Whether no point of the material can be seen: its alpha is zero everywhere, or below the cut-off.
+bool is_invisible(const Asset& asset, const Material& m) {
+  if (m.alpha_mode == AlphaMode::kOpaque) return false;
+  float largest = m.base_color_factor.a;
+  if (m.base_color) {
+    const Image& image = asset.images[static_cast<size_t>(m.base_color.image)];
+    const auto channels = static_cast<size_t>(image.channels);
+    if (channels == 2 || channels == 4) {
+      float alpha = 0;
+      for (size_t i = channels - 1; i < image.pixels.size(); i += channels)
+        alpha = std::max(alpha, image.pixels[i]);
+      largest *= alpha;
+    }
+  }
+  return m.alpha_mode == AlphaMode::kMask ? largest < m.alpha_cutoff : largest <= 0.0f;
+}
+
+void require_visible(const Asset& asset) {
+  std::vector<bool> invisible;
+  for (const Material& m : asset.materials) invisible.push_back(is_invisible(asset, m));
+  std::string name;
+  for (const Primitive& primitive : asset.primitives) {
+    if (primitive.triangles.empty()) continue;
+    const auto material = static_cast<size_t>(primitive.material);
+    if (!invisible[material]) return;
+    name = asset.materials[material].name;
+  }
+  throw Error(ErrorCode::kFormat, asset.path.string(),
+              fmt::format("all of its materials are invisible (alpha is zero, for instance that of '{}'), so "
+                          "there is nothing to see or to change",
+                          printable(name, 60)));
+}
+
+}  // namespace
+
 void require_enhanceable(const Asset& asset) {
   bounds(asset);
   bool has_area = false;
@@ -86,6 +135,7 @@ void require_enhanceable(const Asset& asset) {
   if (!has_area)
     throw Error(ErrorCode::kFormat, asset.path.string(),
                 "every triangle is degenerate, so there is no surface to work on");
+  require_visible(asset);
   std::string without_uv;
   bool any_uv = false;
   for (const Primitive& primitive : asset.primitives) {

@@ -54,7 +54,7 @@ struct Material {
 struct Primitive {
   std::string name;                   // mesh name, for messages
   int material = 0;                   // index into Asset::materials
-  std::vector<vec3> p_world;          // metres
+  std::vector<vec3> p_world;          // metres, relative to Asset::origin
   std::vector<vec3> n_world;          // unit shading normals
   std::vector<vec4> tangent_world;    // xyz unit tangent, w the bitangent's sign; b = w · cross(n, t)
   std::vector<std::vector<vec2>> uv;  // [set][vertex], origin top left
@@ -70,7 +70,7 @@ struct Light {
   vec3 color{1.0f};        // linear
   float intensity = 1.0f;  // candela (point, spot) or lux (directional)
   float range = 0.0f;      // metres, 0: unlimited
-  vec3 p_world{0.0f};
+  vec3 p_world{0.0f};      // relative to Asset::origin
   vec3 direction_world{0, 0, -1};
   float inner_cone_angle = 0.0f, outer_cone_angle = kPi / 4;  // radians
 };
@@ -80,6 +80,7 @@ struct SourceDocument;
 
 struct Asset {
   std::filesystem::path path;
+  glm::dvec3 origin{0.0};  // in the file's world, metres; not zero only for assets that lie far from theirs
   std::vector<Primitive> primitives;
   std::vector<Material> materials;  // at least one: the default material is appended if a primitive needs it
   std::vector<Image> images;        // values as stored in the file, [0,1]
@@ -94,6 +95,11 @@ struct Asset {
 /// names the file, the JSON path or line, what was expected and what was found. No file outside the asset's
 /// folder is opened.
 Asset read_asset(const std::filesystem::path& path);
+/// The same, `file` being the content of `path`, which need not exist.
+Asset read_asset(const std::filesystem::path& path, std::vector<uint8_t> file);
+
+/// Positions and lights relative to another origin; the asset stays where it is in the world.
+void set_origin(Asset& asset, const glm::dvec3& origin);
 
 /// Axis-aligned bounds over all primitives, metres. Throws Error{kFormat} if there is no surface or it has no
 /// size.
@@ -106,9 +112,9 @@ struct Bounds {
 };
 Bounds bounds(const Asset& asset);
 
-/// Throws Error{kFormat} where nothing can be enhanced: no surface, no size, or no texture coordinates on any
-/// mesh (the message says how to get them). Meshes without UVs beside others that have them are left as they
-/// are.
+/// Throws Error{kFormat} where nothing can be enhanced: no surface, no size, nothing visible, or no texture
+/// coordinates on any mesh (the message says how to get them). Meshes without UVs beside others that have
+/// them are left as they are.
 void require_enhanceable(const Asset& asset);
 
 }  // namespace patina::asset

@@ -88,11 +88,11 @@ Json transform_json(const mat3& m, const std::string& name) {
 
 class GltfExporter {
  public:
-  GltfExporter(const ExportRequest& request, bool to_glb)
+  explicit GltfExporter(const ExportRequest& request)
       : request_(request),
         d_(*request.asset.source),
         root_(d_.json),
-        to_glb_(to_glb),
+        to_glb_(request.plan.kind == OutputKind::kGlb),
         uses_(root_),
         sidecars_(request),
         num_textures_(array_size(root_, "textures")),
@@ -104,7 +104,7 @@ class GltfExporter {
     if (to_glb_) begin_bin();
     for (size_t i = 0; i < request_.asset.materials.size(); ++i)
       if (request_.changed[i].any()) write_material(i);
-    if (to_glb_ && packs_everything_) pack_images();
+    if (plan().packs_everything) pack_images();
     carry_over_files();
     std::vector<uint8_t> file;
     if (to_glb_) {
@@ -123,6 +123,10 @@ class GltfExporter {
 
  private:
   const Asset& asset() const { return request_.asset; }
+  const ExportPlan& plan() const { return request_.plan; }
+  bool was_replaced(size_t image) const {
+    return std::find(replaced_.begin(), replaced_.end(), image) != replaced_.end();
+  }
 
   // ---- materials and textures ----
 
@@ -279,55 +283,77 @@ class GltfExporter {
 
   // ---- the GLB's BIN chunk ----
 
-  bool buffer_is_bin(size_t i) const {
-    return i == 0 && d_.buffers[0].owned.empty() && !d_.buffers[0].bytes.empty();
+  void begin_bin() {
+    if (plan().packs_everything) return pack_buffers();
+    bin_.assign(d_.file.begin() + static_cast<std::ptrdiff_t>(d_.bin_begin),
+                d_.file.begin() + static_cast<std::ptrdiff_t>(d_.bin_end));
   }
 
-  void begin_bin() {
-    packs_everything_ = d_.kind == SourceDocument::Kind::kGltf || (!d_.buffers.empty() && !buffer_is_bin(0));
-    if (!packs_everything_) {
-      bin_.assign(d_.file.begin() + static_cast<std::ptrdiff_t>(d_.bin_begin),
-                  d_.file.begin() + static_cast<std::ptrdiff_t>(d_.bin_end));
-      return;
-    }
-    std::vector<size_t> offsets;
+  // All buffers with data become one, the first. Those without (only a compression extension could fill them)
+  // follow behind it.
+  void pack_buffers() {
+    struct Place {
+      size_t buffer, offset;
+    };
+    std::vector<Place> places;
+    Json buffers = Json::array({Json::object()});
     for (size_t i = 0; i < d_.buffers.size(); ++i) {
-      if (d_.buffers[i].bytes.empty())
-        throw Error(ErrorCode::kUnsupported, request_.path.string(),
-                    fmt::format("buffer {} has no data that patina can read, so it cannot be packed into a "
-                                "GLB; export to .gltf",
-                                i));
+      if (d_.buffers[i].bytes.empty()) {
+        places.push_back({buffers.size(), 0});
+        buffers.push_back(Json::parse(root_["buffers"][i].dump()));
+        continue;
+      }
+      if (buffers[0].empty()) buffers[0] = Json::parse(root_["buffers"][i].dump());
       align_bin();
-      offsets.push_back(bin_.size());
+      places.push_back({0, bin_.size()});
       bin_.insert(bin_.end(), d_.buffers[i].bytes.begin(), d_.buffers[i].bytes.end());
     }
+    const auto moved = [&](const nlohmann::json& at) -> Json {
+      const Place& place = places[at["buffer"].get<size_t>()];
+      return {{"buffer", place.buffer}, {"byteOffset", at.value("byteOffset", size_t{0}) + place.offset}};
+    };
+    const auto stays = [&](const nlohmann::json& at) {
+      const auto buffer = at["buffer"].get<size_t>();
+      return places[buffer].buffer == buffer && places[buffer].offset == 0;
+    };
     for (size_t v = 0; v < num_views_; ++v) {
       const auto& view = root_["bufferViews"][v];
-      const auto buffer = view["buffer"].get<size_t>();
-      if (buffer == 0) continue;
-      patch_["bufferViews"][std::to_string(v)] = {
-          {"buffer", 0}, {"byteOffset", view.value("byteOffset", size_t{0}) + offsets[buffer]}};
+      if (!stays(view)) patch_["bufferViews"][std::to_string(v)] = moved(view);
+      for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+        if (!view.contains("extensions") || !view["extensions"].contains(name)) continue;
+        const auto& compressed = view["extensions"][name];
+        if (names_buffer(compressed) && !stays(compressed))
+          patch_["bufferViews"][std::to_string(v)]["extensions"][name] = moved(compressed);
+      }
     }
-    if (d_.buffers.size() == 1) patch_["buffers"]["0"]["uri"] = nullptr;
-    if (d_.buffers.size() > 1) {
-      Json merged = Json::parse(root_["buffers"][0].dump());
-      merged.erase("uri");
-      merged["byteLength"] = bin_.size();
-      patch_["buffers"]["="] = Json::array({std::move(merged)});
+    if (d_.buffers.empty()) return;
+    if (buffers.size() == 1 && d_.buffers.size() == 1) {
+      patch_["buffers"]["0"]["uri"] = nullptr;
+      return;
     }
+    if (bin_.empty()) bin_.assign(4, 0);  // a buffer must have bytes
+    buffers[0].erase("uri");
+    buffers[0]["byteLength"] = bin_.size();
+    patch_["buffers"]["="] = std::move(buffers);
   }
 
-  // Every image becomes part of the GLB, unless it was replaced just now.
+  bool names_buffer(const nlohmann::json& json) const {
+    return json.is_object() && json.contains("buffer") && json["buffer"].is_number_unsigned() &&
+           json["buffer"].get<size_t>() < d_.buffers.size() &&
+           (!json.contains("byteOffset") || json["byteOffset"].is_number_unsigned());
+  }
+
+  // Every image becomes part of the GLB, unless it was replaced just now or cannot be read.
   void pack_images() {
     for (size_t i = 0; i < array_size(root_, "images"); ++i) {
-      if (!root_["images"][i].contains("uri") ||
-          std::find(replaced_.begin(), replaced_.end(), i) != replaced_.end())
+      const auto& left = plan().left_images;
+      if (!root_["images"][i].contains("uri") || was_replaced(i) ||
+          std::find(left.begin(), left.end(), i) != left.end())
         continue;
       const EncodedImage encoded = encoded_image(d_, i);
-      const auto format = image_format(encoded.bytes);
       Json image = {{"uri", nullptr}, {"bufferView", add_view(encoded.bytes)}};
-      if (!root_["images"][i].contains("mimeType"))
-        image["mimeType"] = format == ImageFormat::kJpeg ? "image/jpeg" : "image/png";
+      const std::string type(mime_type(encoded.bytes));
+      if (root_["images"][i].value("mimeType", "") != type) image["mimeType"] = type;
       patch_["images"][std::to_string(i)] = std::move(image);
     }
   }
@@ -357,24 +383,22 @@ class GltfExporter {
 
   // A GLB's own chunk becomes a file beside the .gltf.
   void unpack_bin() {
-    if (d_.buffers.empty() || !buffer_is_bin(0)) return;
-    const std::string name = request_.path.stem().string() + ".bin";
-    sidecars_.add(name, {d_.buffers[0].bytes.begin(), d_.buffers[0].bytes.end()});
+    if (!has_bin(d_)) return;
+    const std::string name = sidecars_.add(request_.path.stem().string(), ".bin",
+                                           {d_.buffers[0].bytes.begin(), d_.buffers[0].bytes.end()});
     patch_["buffers"]["0"]["uri"] = percent_encoded(name);
   }
 
+  // Files that the output still refers to.
   void carry_over_files() {
-    if (to_glb_ && packs_everything_) return;
-    for (const SourceBuffer& buffer : d_.buffers)
-      if (!buffer.reference.empty()) sidecars_.carry_over(buffer.reference);
+    if (!plan().packs_everything)
+      for (const SourceBuffer& buffer : d_.buffers)
+        if (!buffer.reference.empty()) sidecars_.carry_over(buffer.reference);
     for (size_t i = 0; i < array_size(root_, "images"); ++i) {
-      const auto& image = root_["images"][i];
-      if (!image.contains("uri") || is_data_uri(image["uri"].get<std::string>()) ||
-          std::find(replaced_.begin(), replaced_.end(), i) != replaced_.end())
-        continue;
-      const std::string reference = percent_decoded(image["uri"].get<std::string>(), d_.name);
-      if (std::find(d_.references.begin(), d_.references.end(), reference) != d_.references.end())
-        sidecars_.carry_over(reference);
+      const auto& left = plan().left_images;
+      const bool packed = plan().packs_everything && std::find(left.begin(), left.end(), i) == left.end();
+      if (packed || was_replaced(i)) continue;
+      if (const auto reference = image_reference(d_, i)) sidecars_.carry_over(*reference);
     }
   }
 
@@ -389,13 +413,13 @@ class GltfExporter {
   size_t num_textures_, num_images_, num_views_, num_samplers_;
   std::vector<size_t> replaced_;
   std::vector<uint8_t> bin_;
-  bool packs_everything_ = false, bin_grew_ = false, extension_added_ = false;
+  bool bin_grew_ = false, extension_added_ = false;
 };
 
 }  // namespace
 
-void export_gltf(const ExportRequest& request, bool to_glb) {
-  GltfExporter(request, to_glb).write();
+void export_gltf(const ExportRequest& request) {
+  GltfExporter(request).write();
 }
 
 }  // namespace patina::asset

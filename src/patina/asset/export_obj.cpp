@@ -3,19 +3,24 @@
 // they were read.
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
 #include "patina/asset/export.h"
+#include "patina/asset/mtl_reader.h"
+#include "patina/asset/obj_files.h"
 #include "patina/asset/obj_text.h"
 #include "patina/asset/texture_bake.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
+#include "patina/base/utf8.h"
 #include "patina/image/image_io.h"
 
 namespace patina::asset {
 namespace {
 
+namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 Image channel_of(const Image& image, int channel) {
@@ -82,31 +87,54 @@ std::string joined(const Statements& statements) {
   return out;
 }
 
-// One library's text with the statements of changed materials put in behind their newmtl and the old ones
-// taken out.
-std::string changed_library(const std::string& text, std::map<std::string, Statements>& by_material) {
+// A texture statement as it has to stand beside the output: names are relative to the library's folder, which
+// may lie below the asset's, and files that were found elsewhere are named where they are. Empty where the
+// line can stay as it is.
+std::string moved_statement(const TextLine& line, const SourceDocument& d, const fs::path& base) {
+  if (!names_picture(lowered(line.keyword))) return "";
+  const TextureStatement parsed = texture_statement(line.rest);
+  const auto found = parsed.file.empty() ? std::nullopt : find_named_file(d.folder(), base, parsed.file);
+  if (!found || (base.empty() && found->as_written)) return "";
+  return fmt::format("{} {}{}", line.keyword, parsed.options, found->relative.generic_string());
+}
+
+// One library's text as it stands beside the output, with the statements of changed materials put in behind
+// their newmtl and the old ones taken out. `written` notes which materials that were.
+std::string changed_library(const SourceDocument& d, const std::string& reference,
+                            const std::map<std::string, Statements>& by_material,
+                            std::set<std::string>& written) {
+  const std::string text = read_mtl_text(d.folder() / reference);
   std::string out;
   size_t at = 0;
   std::vector<std::string> replaced;  // keywords that the current material gets anew
+  const auto take_to = [&](size_t end) {
+    out.append(text, at, end - at);
+    at = end;
+  };
   for (const TextLine& line : text_lines(text)) {
-    if (lowered(line.keyword) == "newmtl") {
+    const std::string keyword = lowered(line.keyword);
+    if (keyword == "newmtl") {
       replaced.clear();
       const auto found = by_material.find(line.rest);
       if (found == by_material.end()) continue;
-      for (const auto& [keyword, unused] : found->second) replaced.push_back(lowered(keyword));
-      const size_t next = std::min(line.end + 1, text.size());
-      out.append(text, at, next - at);
-      if (!out.ends_with('\n')) out += '\n';
+      for (const auto& [name, unused] : found->second) replaced.push_back(lowered(name));
+      take_to(line.next);
+      if (!out.ends_with('\n') && !out.ends_with('\r')) out += '\n';
       out += joined(found->second);
-      at = next;
-      by_material.erase(found);
-    } else if (std::find(replaced.begin(), replaced.end(), lowered(line.keyword)) != replaced.end()) {
-      out.append(text, at, line.begin - at);
-      at = std::min(line.end + 1, text.size());
+      written.insert(line.rest);
+    } else if (std::find(replaced.begin(), replaced.end(), keyword) != replaced.end()) {
+      take_to(line.begin);
+      at = line.next;
+    } else if (const std::string moved = moved_statement(line, d, fs::path(reference).parent_path());
+               !moved.empty()) {
+      take_to(line.begin);
+      out += moved;
+      at = line.end;
     }
   }
-  out.append(text, at);
-  if (!out.empty() && !out.ends_with('\n')) out += '\n';
+  take_to(text.size());
+  if (out.starts_with("\xEF\xBB\xBF")) out.erase(0, 3);
+  if (!out.empty() && !out.ends_with('\n') && !out.ends_with('\r')) out += '\n';
   return out;
 }
 
@@ -114,16 +142,24 @@ std::string changed_library(const std::string& text, std::map<std::string, State
 // first usemtl.
 std::string with_library(std::string_view text, const std::string& library,
                          const std::string& first_material) {
-  std::string head = "mtllib " + library + "\n";
-  if (!first_material.empty()) head += "usemtl " + first_material + "\n";
-  std::string out = head;
+  const char* line_end = text.find('\n') == text.npos && text.find('\r') != text.npos ? "\r" : "\n";
+  std::string out = "mtllib " + library + line_end;
+  if (!first_material.empty()) out += "usemtl " + first_material + line_end;
   size_t at = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
   for (const TextLine& line : text_lines(text)) {
     if (line.keyword != "mtllib") continue;
     out.append(text.substr(at, line.begin - at));
-    at = std::min(line.end + 1, text.size());
+    at = line.next;
   }
   return out.append(text.substr(at));
+}
+
+// The stem of a library's file name that every reader takes for one word.
+std::string library_stem(const fs::path& output) {
+  std::string name = output.stem().string();
+  for (char& c : name)
+    if (static_cast<unsigned char>(c) <= ' ' || c == '"' || c == '#' || c == '\\' || c == 0x7F) c = '_';
+  return name + ".patina";
 }
 
 // ---- OBJ to GLB
@@ -162,6 +198,10 @@ class GlbBuilder {
     }
     return root_["textures"].size() - 1;
   }
+  void use_extension(const std::string& name) {
+    Json& used = root_["extensionsUsed"];
+    if (std::find(used.begin(), used.end(), name) == used.end()) used.push_back(name);
+  }
   Json& root() { return root_; }
   std::vector<uint8_t> file(const std::string& name) {
     root_["buffers"] = Json::array({Json{{"byteLength", bin_.size()}}});
@@ -178,7 +218,7 @@ Json texture_info(GlbBuilder& builder, const Image& image, const std::string& na
   const mat3& m = ref.uv_transform;
   if (m == mat3(1.0f)) return info;
   info["extensions"]["KHR_texture_transform"] = {{"offset", {m[2].x, m[2].y}}, {"scale", {m[0].x, m[1].y}}};
-  builder.root()["extensionsUsed"] = {"KHR_texture_transform"};
+  builder.use_extension("KHR_texture_transform");
   return info;
 }
 
@@ -226,6 +266,10 @@ Json material_json(const ExportRequest& request, size_t i, GlbBuilder& builder) 
   if (m.emissive_factor != vec3(0.0f))
     json["emissiveFactor"] = {m.emissive_factor.r / strength, m.emissive_factor.g / strength,
                               m.emissive_factor.b / strength};
+  if (strength > 1.0f) {
+    json["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = strength;
+    builder.use_extension("KHR_materials_emissive_strength");
+  }
   if (m.alpha_mode == AlphaMode::kBlend) json["alphaMode"] = "BLEND";
   if (m.double_sided) json["doubleSided"] = true;
   return json;
@@ -254,7 +298,6 @@ Json primitive_json(const Primitive& p, GlbBuilder& builder) {
 
 void export_obj(const ExportRequest& request) {
   const SourceDocument& d = *request.asset.source;
-  const std::string_view text(reinterpret_cast<const char*>(d.file.data()), d.file.size());
   SidecarFiles sidecars(request);
   for (const std::string& reference : d.references)
     if (!request.any_changed() ||
@@ -264,30 +307,40 @@ void export_obj(const ExportRequest& request) {
     sidecars.write();
     return write_file(request.path, std::span<const uint8_t>(d.file));
   }
+  const std::set<std::string> taken(d.material_names.begin(), d.material_names.end());
+  std::string nameless;  // what faces without a material are given
   std::map<std::string, Statements> by_material;
-  for (size_t i = 0; i < request.asset.materials.size(); ++i)
-    if (request.changed[i].any())
-      by_material[request.asset.materials[i].name] = statements_of(request, i, sidecars);
+  for (size_t i = 0; i < request.asset.materials.size(); ++i) {
+    if (!request.changed[i].any()) continue;
+    std::string name = d.material_names[i];
+    if (name.empty()) {
+      name = "default";
+      while (taken.contains(name)) name += "_";
+      nameless = name;
+    }
+    by_material[name] = statements_of(request, i, sidecars);
+  }
 
   std::string library = "# textures by patina\n";
+  std::set<std::string> written;
   for (const std::string& reference : d.mtl_references)
-    library += changed_library(read_text_file(d.folder() / reference), by_material);
+    library += changed_library(d, reference, by_material, written);
   // What no library knew: materials that faces name without a definition, and the one of faces that name
   // none.
-  const bool bare_faces = by_material.contains("default");
   for (const auto& [name, statements] : by_material)
-    library += fmt::format("newmtl {}\n{}", name, joined(statements));
-  const std::string library_name = request.path.stem().string() + ".patina.mtl";
-  sidecars.add(library_name, {library.begin(), library.end()});
+    if (!written.contains(name)) library += fmt::format("newmtl {}\n{}", name, joined(statements));
+  const std::string name = sidecars.add(library_stem(request.path), ".mtl", {library.begin(), library.end()});
   sidecars.write();
-  write_file(request.path, with_library(text, library_name, bare_faces ? "default" : ""));
+  write_file(request.path, with_library(d.obj_text(), name, nameless));
 }
 
 void export_obj_as_glb(const ExportRequest& request) {
   GlbBuilder builder;
   Json& root = builder.root();  // its members lie in a vector: no reference to one survives an insertion
   root["scenes"] = Json::array({Json{{"nodes", {0}}}});
-  root["nodes"] = Json::array({Json{{"mesh", 0}, {"name", request.asset.path.stem().string()}}});
+  root["nodes"] = Json::array({Json{{"mesh", 0}, {"name", as_utf8(request.asset.path.stem().string())}}});
+  const glm::dvec3& origin = request.asset.origin;
+  if (origin != glm::dvec3(0.0)) root["nodes"][0]["translation"] = {origin.x, origin.y, origin.z};
   root["bufferViews"] = root["accessors"] = root["materials"] = Json::array();
   for (size_t i = 0; i < request.asset.materials.size(); ++i) {
     Json material = material_json(request, i, builder);

@@ -35,6 +35,15 @@ vec3 unit_or(const glm::dvec3& v, const vec3& otherwise) {
 
 }  // namespace
 
+glm::dvec3 origin_for(const Extent& extent) {
+  // At 64 radii a float still holds steps of 4e-6 radii, a thousandth of a pixel of a view.
+  constexpr double kFarRadii = 64;
+  const glm::dvec3 center = 0.5 * (extent.low + extent.high);
+  const double radius = 0.5 * glm::length(extent.high - extent.low);
+  const bool is_far = std::isfinite(radius) && radius > 0 && glm::length(center) > kFarRadii * radius;
+  return is_far ? center : glm::dvec3(0.0);
+}
+
 Geometry gathered(const Geometry& g, const std::vector<uint32_t>& source, std::vector<uvec3> triangles) {
   Geometry out;
   out.position = gather(g.position, source);
@@ -44,6 +53,13 @@ Geometry gathered(const Geometry& g, const std::vector<uint32_t>& source, std::v
   out.color = gather(g.color, source);
   out.triangles = std::move(triangles);
   return out;
+}
+
+bool has_uv_area(const std::vector<vec2>& uv, const std::vector<uvec3>& triangles) {
+  return std::any_of(triangles.begin(), triangles.end(), [&](const uvec3& t) {
+    const glm::dvec2 a(uv[t.x]), b = glm::dvec2(uv[t.y]) - a, c = glm::dvec2(uv[t.z]) - a;
+    return b.x * c.y - b.y * c.x != 0.0;
+  });
 }
 
 Geometry with_flat_normals(const Geometry& g) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "patina/base/math.h"
@@ -21,9 +22,25 @@ struct Geometry {
   size_t num_vertices() const { return position.size(); }
 };
 
+/// A bounding box in double, for assets whose float positions would not tell their vertices apart.
+struct Extent {
+  glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
+  void add(const glm::dvec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+};
+
+/// The point that positions are stored relative to: (0, 0, 0), or the box's centre where that lies so many
+/// radii away that single precision would coarsen the shape (georeferenced scans).
+glm::dvec3 origin_for(const Extent& extent);
+
 /// Vertex `source[i]` of `geometry` as vertex i; triangles are given anew.
 Geometry gathered(const Geometry& geometry, const std::vector<uint32_t>& source,
                   std::vector<uvec3> triangles);
+
+/// Whether any triangle has an area on texture coordinates `uv` (one a vertex).
+bool has_uv_area(const std::vector<vec2>& uv, const std::vector<uvec3>& triangles);
 
 /// Flat shading: every corner becomes its own vertex with the triangle's normal, tangents are dropped [glTF2,
 /// Sec. 3.7.2.1]. Triangles without area get +Z.

@@ -1,40 +1,17 @@
 #include "patina/asset/gltf_container.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
+#include <set>
 
 #include <fmt/format.h>
 
+#include "patina/asset/extensions.h"
 #include "patina/asset/uri.h"
 #include "patina/base/files.h"
 
 namespace patina::asset {
 namespace {
-
-// Extensions that patina honours or can leave alone without reading wrong data. What an extension of this
-// list adds to a material's look beyond metallic-roughness is carried over and named in a warning.
-constexpr std::array kReadableExtensions = {"KHR_texture_transform",
-                                            "KHR_mesh_quantization",
-                                            "KHR_lights_punctual",
-                                            "KHR_materials_emissive_strength",
-                                            "KHR_materials_variants",
-                                            "KHR_materials_unlit",
-                                            "KHR_materials_clearcoat",
-                                            "KHR_materials_sheen",
-                                            "KHR_materials_specular",
-                                            "KHR_materials_ior",
-                                            "KHR_materials_transmission",
-                                            "KHR_materials_volume",
-                                            "KHR_materials_iridescence",
-                                            "KHR_materials_anisotropy",
-                                            "KHR_materials_dispersion",
-                                            "KHR_materials_diffuse_transmission",
-                                            "KHR_xmp",
-                                            "KHR_xmp_json_ld",
-                                            "KHR_animation_pointer",
-                                            "KHR_node_visibility",
-                                            "EXT_lights_image_based"};
 
 uint32_t little_u32(std::span<const uint8_t> b, size_t at) {
   return uint32_t{b[at + 3]} << 24 | uint32_t{b[at + 2]} << 16 | uint32_t{b[at + 1]} << 8 | b[at];
@@ -100,13 +77,29 @@ void check_asset_and_extensions(const SourceDocument& d) {
   if (const auto required = root.find("extensionsRequired"))
     for (size_t i = 0; i < required->size(); ++i) {
       const std::string& name = (*required)[i].string();
-      if (std::find(kReadableExtensions.begin(), kReadableExtensions.end(), name) ==
-          kReadableExtensions.end())
-        (*required)[i].fail(
-            fmt::format("the file requires the extension {}, which patina does not read; export it without",
-                        printable(name, 80)),
-            ErrorCode::kUnsupported);
+      const ExtensionRow* row = find_extension(name);
+      if (!row || row->use == ExtensionUse::kRefused)
+        (*required)[i].fail(fmt::format("the file requires the extension {}, which patina does not read; {}",
+                                        printable(name, 80), row ? row->remark : "export it without"),
+                            ErrorCode::kUnsupported);
     }
+}
+
+// Names what the file uses and the views do not show. Extensions of materials are named with their material.
+void note_extensions(const SourceDocument& d, std::vector<std::string>& warnings) {
+  std::set<std::string> of_materials;
+  if (const auto materials = d.json.find("materials"); materials != d.json.end() && materials->is_array())
+    for (const auto& material : *materials)
+      if (material.is_object() && material.contains("extensions") && material["extensions"].is_object())
+        for (const auto& [name, unused] : material["extensions"].items()) of_materials.insert(name);
+  for (const std::string& name : extensions_in(d.json)) {
+    const ExtensionRow* row = find_extension(name);
+    if (of_materials.contains(name) ||
+        (row && (row->use == ExtensionUse::kObeyed || row->use == ExtensionUse::kCarriedOver)))
+      continue;
+    warnings.push_back(fmt::format("the file uses the extension {}, which is carried over: {}",
+                                   printable(name, 80), row ? row->remark : "patina does not know it"));
+  }
 }
 
 void load_buffers(SourceDocument& d) {
@@ -223,6 +216,7 @@ OpenedGltf open_gltf(const std::filesystem::path& path, std::vector<uint8_t> fil
     throw Error(ErrorCode::kFormat, d->name,
                 fmt::format("the JSON is {}, expected an object", d->json.type_name()));
   check_asset_and_extensions(*d);
+  note_extensions(*d, warnings);
   load_buffers(*d);
   check_views(*d);
   note_references(*d);

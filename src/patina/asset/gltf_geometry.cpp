@@ -78,6 +78,29 @@ struct AttributeReader {
     return vectors_of<Vector>(values, found.num_components);
   }
 
+  // An attribute that can be made anew: elements that are not finite become `otherwise`, with a note.
+  template <class Vector>
+  std::vector<Vector> read_or(const std::string& name, std::initializer_list<int> components,
+                              const Vector& otherwise, std::vector<std::string>& warnings) const {
+    const auto reference = attributes.find(name);
+    if (!reference) return {};
+    const AccessorInfo found = info(*reference, name, components);
+    check_attribute(found, name, quantized);
+    std::vector<Vector> out = vectors_of<Vector>(read_floats(d, found), found.num_components);
+    size_t replaced = 0;
+    for (Vector& v : out) {
+      bool finite = true;
+      for (glm::length_t c = 0; c < Vector::length(); ++c) finite = finite && std::isfinite(v[c]);
+      if (finite) continue;
+      v = otherwise;
+      ++replaced;
+    }
+    if (replaced > 0)
+      warnings.push_back(fmt::format("{}: {} of {} vertices are not finite numbers and are replaced",
+                                     reference->where(), name, replaced));
+    return out;
+  }
+
   template <class Vector>
   std::vector<Vector> read_if_there(const std::string& name, std::initializer_list<int> components) const {
     const auto reference = attributes.find(name);
@@ -151,6 +174,16 @@ void normalize_frames(Geometry& g) {
   if (!tangents_usable) g.tangent.clear();
 }
 
+// Sets ought to follow one another from TEXCOORD_0. One that is missing below another is a single point.
+void read_uvs(const AttributeReader& reader, Geometry& g) {
+  for (int set = 0; set < 16; ++set) {
+    auto uv = reader.read_if_there<vec2>(fmt::format("TEXCOORD_{}", set), {2});
+    if (uv.empty()) continue;
+    g.uv.resize(static_cast<size_t>(set), std::vector<vec2>(reader.count, vec2(0.0f)));
+    g.uv.push_back(std::move(uv));
+  }
+}
+
 void refuse_compressed(const JsonView& primitive) {
   const auto extensions = primitive.find("extensions");
   if (!extensions || !extensions->find("KHR_draco_mesh_compression")) return;
@@ -185,15 +218,11 @@ std::optional<LocalPrimitive> read_primitive(const SourceDocument& d, const Json
   Geometry& g = out.geometry;
   g.position = reader.read<vec3>(*position, "POSITION", {3});
   reader.count = info.count;
-  g.normal = reader.read_if_there<vec3>("NORMAL", {3});
-  if (!g.normal.empty())
-    g.tangent = reader.read_if_there<vec4>("TANGENT", {4});  // without normals they must be ignored
-  for (int set = 0; set < 16; ++set) {
-    auto uv = reader.read_if_there<vec2>(fmt::format("TEXCOORD_{}", set), {2});
-    if (uv.empty()) break;
-    g.uv.push_back(std::move(uv));
-  }
-  g.color = reader.read_if_there<vec4>("COLOR_0", {3, 4});
+  // Without a length both are made anew; without normals tangents must be ignored.
+  g.normal = reader.read_or<vec3>("NORMAL", {3}, vec3(0.0f), warnings);
+  if (!g.normal.empty()) g.tangent = reader.read_or<vec4>("TANGENT", {4}, vec4(0.0f), warnings);
+  read_uvs(reader, g);
+  g.color = reader.read_or<vec4>("COLOR_0", {3, 4}, vec4(1.0f), warnings);
   if (const auto joints = attributes.find("JOINTS_0")) {
     const AccessorInfo joints_info = reader.info(*joints, "JOINTS_0", {4});
     const std::vector<uint32_t> values = read_integers(d, joints_info);

@@ -7,8 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "patina/asset/extensions.h"
 #include "patina/asset/gltf_container.h"
 #include "patina/base/parallel.h"
+#include "patina/base/utf8.h"
 #include "patina/image/image_header.h"
 #include "patina/image/image_io.h"
 
@@ -52,7 +54,9 @@ mat3 transform_of(const JsonView& json) {
 constexpr std::array kImageExtensions = {"KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif",
                                          "MSFT_texture_dds"};
 
-TextureRef texture_ref(const SourceDocument& d, const JsonView& info, std::vector<std::string>& warnings) {
+// A texture whose image patina cannot read is an error where a mesh shows it, else a note.
+TextureRef texture_ref(const SourceDocument& d, const JsonView& info, bool is_shown,
+                       std::vector<std::string>& warnings) {
   TextureRef ref;
   const auto textures = d.root().find("textures");
   const size_t index = info.at("index").index(textures ? textures->size() : 0, "texture");
@@ -72,7 +76,7 @@ TextureRef texture_ref(const SourceDocument& d, const JsonView& info, std::vecto
   const auto source = texture.find("source");
   if (!source) {
     for (const char* name : kImageExtensions)
-      if (extension(texture, name))
+      if (extension(texture, name) && is_shown)
         texture.fail(fmt::format("its image exists only through the extension {}, which patina does not "
                                  "read; convert it to PNG or JPEG",
                                  name),
@@ -86,17 +90,19 @@ TextureRef texture_ref(const SourceDocument& d, const JsonView& info, std::vecto
 }
 
 void warn_of_unread_extensions(const JsonView& material, std::vector<std::string>& warnings) {
-  constexpr std::array kHonoured = {"KHR_materials_emissive_strength"};
   const auto extensions = material.find("extensions");
   if (!extensions || !extensions->json().is_object()) return;
   std::string names;
-  for (const auto& [name, unused] : extensions->json().items())
-    if (std::find(kHonoured.begin(), kHonoured.end(), name) == kHonoured.end())
+  for (const auto& [name, unused] : extensions->json().items()) {
+    const ExtensionRow* row = find_extension(name);
+    if (!row || (row->use != ExtensionUse::kObeyed && row->use != ExtensionUse::kCarriedOver))
       names += (names.empty() ? "" : ", ") + printable(name, 60);
+  }
   if (!names.empty()) warnings.push_back(material.where() + ": carried over but not rendered: " + names);
 }
 
-Material read_material(const SourceDocument& d, const JsonView& json, std::vector<std::string>& warnings) {
+Material read_material(const SourceDocument& d, const JsonView& json, bool is_shown,
+                       std::vector<std::string>& warnings) {
   Material m;
   const auto unit_number = [&](const JsonView& parent, std::string_view key, float otherwise) {
     const auto found = parent.find(key);
@@ -107,7 +113,7 @@ Material read_material(const SourceDocument& d, const JsonView& json, std::vecto
   };
   const auto texture = [&](const JsonView& parent, std::string_view key) {
     const auto found = parent.find(key);
-    return found ? texture_ref(d, *found, warnings) : TextureRef{};
+    return found ? texture_ref(d, *found, is_shown, warnings) : TextureRef{};
   };
   if (const auto name = json.find("name")) m.name = short_name(name->string());
   if (const auto pbr = json.find("pbrMetallicRoughness")) {
@@ -127,7 +133,7 @@ Material read_material(const SourceDocument& d, const JsonView& json, std::vecto
                        ": is described by KHR_materials_pbrSpecularGlossiness alone, which is not read");
   }
   if (const auto normal = json.find("normalTexture")) {
-    m.normal = texture_ref(d, *normal, warnings);
+    m.normal = texture_ref(d, *normal, is_shown, warnings);
     if (const auto scale = normal->find("scale")) m.normal_scale = static_cast<float>(scale->number());
   }
   m.occlusion = texture(json, "occlusionTexture");
@@ -153,38 +159,87 @@ Material read_material(const SourceDocument& d, const JsonView& json, std::vecto
   return m;
 }
 
+// Materials that some mesh uses. What is wrong with the textures of any other is a note.
+std::set<int> materials_of_meshes(const nlohmann::json& root) {
+  std::set<int> used;
+  const auto meshes = root.find("meshes");
+  if (meshes == root.end() || !meshes->is_array()) return used;
+  for (const auto& mesh : *meshes) {
+    if (!mesh.is_object() || !mesh.contains("primitives") || !mesh["primitives"].is_array()) continue;
+    for (const auto& primitive : mesh["primitives"])
+      if (primitive.is_object() && primitive.contains("material") &&
+          primitive["material"].is_number_integer())
+        used.insert(primitive["material"].get<int>());
+  }
+  return used;
+}
+
+std::array<TextureRef*, 5> textures_of(Material& m) {
+  return {&m.base_color, &m.metallic_roughness, &m.normal, &m.occlusion, &m.emissive};
+}
+
+struct PendingImage {
+  size_t index;
+  std::string where;
+  EncodedImage encoded;
+  ImageHeader header;
+  Image decoded;  // already, where no mesh shows it: whether it can be is known then
+};
+
+// Bytes of the image, or the note that stands in for them: a file that is not there costs its texture, not
+// the asset, and an image that no mesh shows may be broken in any way.
+std::optional<PendingImage> pending_image(const SourceDocument& d, size_t index, bool is_shown,
+                                          Asset& asset) {
+  const JsonView image = d.root().at("images")[index];
+  try {
+    PendingImage pending{index, image.where(), encoded_image(d, index), {}, {}};
+    pending.header = inspect_image(pending.encoded.bytes, pending.where);
+    if (!is_shown) pending.decoded = decode_image(pending.encoded.bytes, pending.where);
+    return pending;
+  } catch (const Error& e) {
+    if (is_shown && e.code() != ErrorCode::kNotFound) throw;
+    asset.warnings.push_back(fmt::format("{}; materials go without it, and it stays as it is in the output",
+                                         std::string(e.what())));
+    return std::nullopt;
+  }
+}
+
 // Decodes the images that materials refer to, several at a time.
-void read_images(const SourceDocument& d, Asset& asset) {
+void read_images(const SourceDocument& d, Asset& asset, const std::set<int>& shown_materials) {
   const auto images = d.root().find("images");
   if (!images) return;
   const size_t count = images->size();
   asset.images.resize(count);
   asset.image_names.resize(count);
-  std::set<int> used;
-  for (const Material& m : asset.materials)
-    for (const TextureRef* ref : {&m.base_color, &m.metallic_roughness, &m.normal, &m.occlusion, &m.emissive})
-      if (*ref) used.insert(ref->image);
+  std::set<int> used, shown;
+  for (size_t m = 0; m < asset.materials.size(); ++m)
+    for (const TextureRef* ref : textures_of(asset.materials[m])) {
+      if (!*ref) continue;
+      used.insert(ref->image);
+      if (shown_materials.contains(static_cast<int>(m))) shown.insert(ref->image);
+    }
 
-  struct Pending {
-    size_t index;
-    std::string where;
-    EncodedImage encoded;
-  };
-  std::vector<Pending> pending;
+  std::vector<PendingImage> pending;
   const uint64_t allowed = memory_budget(source_bytes(d)).image_bytes;
   uint64_t encoded_bytes = 0, decoded_bytes = 0;
   for (size_t i = 0; i < count; ++i) {
     const JsonView image = (*images)[i];
     if (const auto name = image.find("name")) asset.image_names[i] = short_name(name->string());
     if (!used.contains(static_cast<int>(i))) continue;
-    pending.push_back({i, image.where(), encoded_image(d, i)});
-    Pending& p = pending.back();
+    auto found = pending_image(d, i, shown.contains(static_cast<int>(i)), asset);
+    if (!found) {
+      for (Material& m : asset.materials)
+        for (TextureRef* ref : textures_of(m))
+          if (ref->image == static_cast<int>(i)) *ref = {};
+      continue;
+    }
+    pending.push_back(*std::move(found));
+    const PendingImage& p = pending.back();
     if (asset.image_names[i].empty())
-      asset.image_names[i] = short_name(std::filesystem::path(p.encoded.reference).stem().string());
-    const ImageHeader header = inspect_image(p.encoded.bytes, p.where);
+      asset.image_names[i] = short_name(as_utf8(std::filesystem::path(p.encoded.reference).stem().string()));
     encoded_bytes += p.encoded.reference.empty() ? 0 : p.encoded.bytes.size();
-    decoded_bytes += uint64_t{4} * static_cast<uint64_t>(header.width) *
-                     static_cast<uint64_t>(header.height) * static_cast<uint64_t>(header.channels);
+    decoded_bytes += uint64_t{4} * static_cast<uint64_t>(p.header.width) *
+                     static_cast<uint64_t>(p.header.height) * static_cast<uint64_t>(p.header.channels);
     if (decoded_bytes > allowed + 200 * encoded_bytes)
       image.fail(fmt::format("the images up to this one decode to {} MiB, more than files of this size may",
                              decoded_bytes >> 20),
@@ -192,8 +247,9 @@ void read_images(const SourceDocument& d, Asset& asset) {
   }
   parallel_for(0, static_cast<int64_t>(pending.size()), 1, [&](int64_t begin, int64_t end) {
     for (auto k = static_cast<size_t>(begin); k < static_cast<size_t>(end); ++k) {
-      Pending& p = pending[k];
-      asset.images[p.index] = decode_image(p.encoded.bytes, p.where);
+      PendingImage& p = pending[k];
+      asset.images[p.index] =
+          p.decoded.empty() ? decode_image(p.encoded.bytes, p.where) : std::move(p.decoded);
       p.encoded.bytes = {};
     }
   });
@@ -217,10 +273,12 @@ std::string short_name(const std::string& name) {
 }
 
 void read_materials(const SourceDocument& d, Asset& asset) {
+  const std::set<int> shown = materials_of_meshes(d.json);
   if (const auto materials = d.root().find("materials"))
     for (size_t i = 0; i < materials->size(); ++i)
-      asset.materials.push_back(read_material(d, (*materials)[i], asset.warnings));
-  read_images(d, asset);
+      asset.materials.push_back(
+          read_material(d, (*materials)[i], shown.contains(static_cast<int>(i)), asset.warnings));
+  read_images(d, asset, shown);
 }
 
 }  // namespace patina::asset

@@ -26,8 +26,11 @@ dmat4 local_transform(const JsonView& node) {
     dmat4 m;
     for (size_t i = 0; i < 16; ++i)
       m[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = (*matrix)[i].number();
-    if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1)
-      matrix->fail("the matrix is projective; its last row must be 0 0 0 1");
+    // Exporters that multiply in single precision leave a last row that is 0 0 0 1 but for rounding.
+    constexpr double kRounding = 1e-4;
+    const glm::dvec4 off(m[0][3], m[1][3], m[2][3], m[3][3] - 1);
+    if (glm::length(off) > kRounding) matrix->fail("the matrix is projective; its last row must be 0 0 0 1");
+    m[0][3] = m[1][3] = m[2][3] = 0, m[3][3] = 1;
     return m;
   }
   dmat4 m(1.0);
@@ -78,13 +81,21 @@ std::vector<dmat4> world_transforms(const JsonView& nodes) {
   return world;
 }
 
-// Nodes of the default scene, parents before children; of all root nodes where the file has no scene.
+// Whether KHR_node_visibility hides a node and all below it.
+bool is_hidden(const JsonView& node) {
+  const auto extensions = node.find("extensions");
+  const auto visibility = extensions ? extensions->find("KHR_node_visibility") : std::nullopt;
+  const auto visible = visibility ? visibility->find("visible") : std::nullopt;
+  return visible && !visible->boolean();
+}
+
+// Visible nodes of the default scene, parents before children; of all root nodes where the file has no scene.
 std::vector<size_t> scene_nodes(const SourceDocument& d, const JsonView& nodes) {
   const JsonView root = d.root();
   std::vector<size_t> order;
   std::vector<bool> listed(nodes.size(), false);
   const auto add = [&](size_t node) {
-    if (!listed[node]) order.push_back(node);
+    if (!listed[node] && !is_hidden(nodes[node])) order.push_back(node);
     listed[node] = true;
   };
   const auto scenes = root.find("scenes");
@@ -112,15 +123,26 @@ std::vector<size_t> scene_nodes(const SourceDocument& d, const JsonView& nodes) 
 // ---- normals, tangents, instances
 // ---------------------------------------------------------------------------------
 
-// Makes what the file left out. Tangents follow the UVs that the normal map is read with, or UV set 0 for a
-// material that has none yet and may be given one.
+// The UV set that a normal map of the material is read with, or would be (texture_uv_set).
+size_t tangent_set(const Geometry& g, const Material& material) {
+  const auto existing = [&](int set) {
+    return static_cast<size_t>(set) < g.uv.size() ? static_cast<size_t>(set) : 0;
+  };
+  if (material.normal) return existing(material.normal.uv_set);
+  if (has_uv_area(g.uv[0], g.triangles)) return 0;
+  for (const TextureRef* ref : {&material.base_color, &material.metallic_roughness})
+    if (*ref) return existing(ref->uv_set);
+  return 0;
+}
+
+// Makes what the file left out. Tangents follow the UVs that the normal map is read with, also for a material
+// that has none yet and may be given one.
 void complete(Geometry& g, const Material& material) {
   if (g.normal.empty()) g = with_flat_normals(g);
   if (std::any_of(g.normal.begin(), g.normal.end(), [](const vec3& n) { return n == vec3(0.0f); }))
     make_smooth_normals(g);
   if (!g.tangent.empty() || g.uv.empty()) return;
-  const auto set = static_cast<size_t>(material.normal.uv_set);
-  std::vector<vec2> uv = g.uv[set < g.uv.size() ? set : 0];
+  std::vector<vec2> uv = g.uv[tangent_set(g, material)];
   for (vec2& t : uv) t = vec2(material.normal.uv_transform * vec3(t, 1.0f));
   g = with_mikktspace_tangents(g, uv);
 }
@@ -138,14 +160,14 @@ vec3 unit_or(const dvec3& v, const vec3& otherwise) {
   return length > 0 && std::isfinite(length) ? vec3(v / length) : otherwise;
 }
 
-Primitive instance_of(const Geometry& g, const dmat4& world, const JsonView& node) {
+Primitive instance_of(const Geometry& g, const dmat4& world, const dvec3& origin, const JsonView& node) {
   Primitive out;
   const dmat3 linear(world);
   const dmat3 normals = normal_matrix(linear);
   const bool mirrored = glm::determinant(linear) < 0;
   out.p_world.reserve(g.num_vertices());
   for (const vec3& p : g.position) {
-    const vec3 p_world(world * glm::dvec4(p, 1.0));
+    const vec3 p_world(dvec3(world * glm::dvec4(p, 1.0)) - origin);
     if (!is_finite(p_world)) node.fail("the node's transform moves a vertex beyond the range of numbers");
     out.p_world.push_back(p_world);
   }
@@ -185,9 +207,16 @@ std::vector<dmat4> joint_matrices(const SourceDocument& d, const JsonView& skin,
   return out;
 }
 
-// `local` in its bind pose, in world space.
-Geometry posed(const LocalPrimitive& local, const std::vector<dmat4>& joints, const JsonView& node) {
-  Geometry g = local.geometry;
+// A mesh in its bind pose, and where it stands: positions are relative to `offset`.
+struct Posed {
+  Geometry geometry;
+  dvec3 offset{0.0};
+};
+Posed posed(const LocalPrimitive& local, const std::vector<dmat4>& joints, const JsonView& node) {
+  Posed out{local.geometry};
+  Geometry& g = out.geometry;
+  std::vector<dvec3> p_world(g.num_vertices());
+  Extent extent;
   for (size_t i = 0; i < g.num_vertices(); ++i) {
     dmat4 blend(0.0);
     double sum = 0;
@@ -200,15 +229,66 @@ Geometry posed(const LocalPrimitive& local, const std::vector<dmat4>& joints, co
       sum += weight;
     }
     blend = sum > 0 ? blend / sum : joints.empty() ? dmat4(1.0) : joints[0];
-    g.position[i] = vec3(blend * glm::dvec4(g.position[i], 1.0));
-    if (!is_finite(g.position[i]))
+    p_world[i] = dvec3(blend * glm::dvec4(g.position[i], 1.0));
+    if (!is_finite(vec3(p_world[i])))
       node.fail(fmt::format("the skin moves vertex {} beyond the range of numbers", i));
+    extent.add(p_world[i]);
     if (!g.normal.empty())
       g.normal[i] = unit_or(normal_matrix(dmat3(blend)) * dvec3(g.normal[i]), g.normal[i]);
     if (!g.tangent.empty())
       g.tangent[i] = vec4(unit_or(dmat3(blend) * dvec3(g.tangent[i]), vec3(g.tangent[i])), g.tangent[i].w);
   }
-  return g;
+  out.offset = origin_for(extent);
+  for (size_t i = 0; i < g.num_vertices(); ++i) g.position[i] = vec3(p_world[i] - out.offset);
+  return out;
+}
+
+// ---- instances
+// ----------------------------------------------------------------------------------------------------
+
+// Where EXT_mesh_gpu_instancing places a node's mesh, relative to the node; once, where the node stands, for
+// nodes without it.
+std::vector<dmat4> instance_transforms(const SourceDocument& d, const JsonView& node, uint64_t max_count) {
+  const auto extensions = node.find("extensions");
+  const auto instancing = extensions ? extensions->find("EXT_mesh_gpu_instancing") : std::nullopt;
+  if (!instancing) return {dmat4(1.0)};
+  const JsonView attributes = instancing->at("attributes");
+  size_t count = 0;
+  const auto read = [&](const char* name, int num_components) {
+    const auto reference = attributes.find(name);
+    if (!reference) return std::vector<float>();
+    const AccessorInfo info = accessor_info(d, *reference, max_count);
+    if (info.num_components != num_components)
+      info.json.at("type").fail(fmt::format("{} of instances has elements of {} components, expected {}",
+                                            name, info.num_components, num_components));
+    if (count && info.count != count)
+      reference->fail(fmt::format("{} has {} instances, another attribute {}", name, info.count, count));
+    count = info.count;
+    std::vector<float> values = read_floats(d, info);
+    if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); }))
+      reference->fail("an instance's place is not a finite number");
+    return values;
+  };
+  const std::vector<float> translation = read("TRANSLATION", 3), rotation = read("ROTATION", 4),
+                           scale = read("SCALE", 3);
+  if (count == 0) return {dmat4(1.0)};  // only attributes of its own
+  std::vector<dmat4> out;
+  out.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    dmat4 m(1.0);
+    const auto triple = [&](const std::vector<float>& v) {
+      return dvec3(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
+    };
+    if (!translation.empty()) m = glm::translate(m, triple(translation));
+    if (!rotation.empty()) {
+      const float* q = rotation.data() + 4 * i;
+      const double length = glm::length(glm::dvec4(q[0], q[1], q[2], q[3]));
+      if (length > 1e-12)
+        m = m * glm::mat4_cast(glm::dquat(q[3] / length, q[0] / length, q[1] / length, q[2] / length));
+    }
+    out.push_back(scale.empty() ? m : glm::scale(m, triple(scale)));
+  }
+  return out;
 }
 
 // ---- lights
@@ -236,7 +316,6 @@ Light read_light(const JsonView& json, const dmat4& world) {
     light.inner_cone_angle = angle("innerConeAngle", 0.0f);
     light.outer_cone_angle = std::max(angle("outerConeAngle", 0.25f * kPi), light.inner_cone_angle);
   }
-  light.p_world = vec3(world[3]);
   light.direction_world = unit_or(-dvec3(world[2]), vec3(0, 0, -1));
   return light;
 }
@@ -246,7 +325,9 @@ void read_light_of_node(const SourceDocument& d, const JsonView& node, const dma
   const auto reference = extensions ? extensions->find("KHR_lights_punctual") : std::nullopt;
   if (!reference) return;
   const JsonView lights = d.root().at("extensions").at("KHR_lights_punctual").at("lights");
-  asset.lights.push_back(read_light(lights[reference->at("light").index(lights.size(), "light")], world));
+  Light light = read_light(lights[reference->at("light").index(lights.size(), "light")], world);
+  light.p_world = vec3(dvec3(world[3]) - asset.origin);
+  asset.lights.push_back(light);
 }
 
 // ---- flattening
@@ -263,6 +344,7 @@ class Flattener {
     const JsonView mesh = (*meshes)[index];
     const auto name_json = mesh.find("name");
     const std::string name = short_name(name_json ? name_json->string() : fmt::format("mesh {}", index));
+    const std::vector<dmat4> instances = instance_transforms(d_, node, budget_);
     const auto skin = node.find("skin");
     if (skin || node.find("weights")) {
       // A pose of its own: nothing to share with other nodes.
@@ -271,11 +353,13 @@ class Flattener {
           const auto skins = d_.root().find("skins");
           const JsonView skin_json =
               (skins ? *skins : d_.root())[skin->index(skins ? skins->size() : 0, "skin")];
-          Geometry g = posed(local, joint_matrices(d_, skin_json, world_), node);
-          add(complete_geometry(std::move(g), local.material), dmat4(1.0), local.material, name, node);
+          Posed pose = posed(local, joint_matrices(d_, skin_json, world_), node);
+          add(own(complete_geometry(std::move(pose.geometry), local.material)),
+              glm::translate(dmat4(1.0), pose.offset), local.material, name, node);
         } else {
-          add(complete_geometry(std::move(local.geometry), local.material), world_[node_index],
-              local.material, name, node);
+          const Geometry& g = own(complete_geometry(std::move(local.geometry), local.material));
+          for (const dmat4& instance : instances)
+            add(g, world_[node_index] * instance, local.material, name, node);
         }
       }
       return;
@@ -286,8 +370,25 @@ class Flattener {
       for (LocalPrimitive& local : place->second)
         local.geometry = complete_geometry(std::move(local.geometry), local.material);
     }
-    for (const LocalPrimitive& local : place->second)
-      add(local.geometry, world_[node_index], local.material, name, node);
+    for (const dmat4& instance : instances)
+      for (const LocalPrimitive& local : place->second)
+        add(local.geometry, world_[node_index] * instance, local.material, name, node);
+  }
+
+  // Makes the primitives, relative to the centre of all of them where that lies far away.
+  void finish() {
+    Extent extent;
+    for (const Instance& instance : instances_)
+      for (const uvec3& t : instance.geometry->triangles)
+        for (int k = 0; k < 3; ++k)
+          extent.add(dvec3(instance.world * glm::dvec4(instance.geometry->position[t[k]], 1.0)));
+    asset_.origin = origin_for(extent);
+    for (const Instance& instance : instances_) {
+      Primitive primitive = instance_of(*instance.geometry, instance.world, asset_.origin, instance.node);
+      primitive.name = instance.name;
+      primitive.material = instance.material >= 0 ? instance.material : default_material_index();
+      asset_.primitives.push_back(std::move(primitive));
+    }
   }
 
  private:
@@ -319,10 +420,13 @@ class Flattener {
   void add(const Geometry& g, const dmat4& world, int material, const std::string& name,
            const JsonView& node) {
     spend(g, node);
-    Primitive primitive = instance_of(g, world, node);
-    primitive.name = name;
-    primitive.material = material >= 0 ? material : default_material_index();
-    asset_.primitives.push_back(std::move(primitive));
+    instances_.push_back({&g, world, material, name, node});
+  }
+
+  // Keeps a geometry that no other node shares.
+  const Geometry& own(Geometry g) {
+    owned_.push_back(std::make_unique<Geometry>(std::move(g)));
+    return *owned_.back();
   }
 
   void spend(const Geometry& g, const JsonView& where) {
@@ -343,9 +447,20 @@ class Flattener {
     return default_material_;
   }
 
+  // A primitive where it shall stand. Geometries live in known_ and owned_, which no longer move.
+  struct Instance {
+    const Geometry* geometry;
+    dmat4 world;
+    int material;
+    std::string name;
+    JsonView node;
+  };
+
   const SourceDocument& d_;
   Asset& asset_;
   std::vector<dmat4> world_;
+  std::vector<Instance> instances_;
+  std::vector<std::unique_ptr<Geometry>> owned_;
   uint64_t budget_;
   std::map<size_t, std::vector<LocalPrimitive>> known_;
   int default_material_ = -1;
@@ -359,12 +474,13 @@ void read_scene(const SourceDocument& d, Asset& asset) {
     asset.warnings.push_back(d.name + ": the file has no nodes, so nothing is placed in the scene");
     return;
   }
-  std::vector<dmat4> world = world_transforms(*nodes);
+  const std::vector<dmat4> world = world_transforms(*nodes);
   const std::vector<size_t> order = scene_nodes(d, *nodes);
-  for (const size_t n : order) read_light_of_node(d, (*nodes)[n], world[n], asset);
-  Flattener flattener(d, asset, std::move(world));
+  Flattener flattener(d, asset, world);
   for (const size_t n : order)
     if ((*nodes)[n].find("mesh")) flattener.add_mesh((*nodes)[n], n);
+  flattener.finish();
+  for (const size_t n : order) read_light_of_node(d, (*nodes)[n], world[n], asset);
 }
 
 }  // namespace patina::asset

@@ -163,6 +163,10 @@ std::vector<MaterialMaps> resolve_materials(const Asset& asset) {
     maps.metallic = packed_map(asset, m.metallic_roughness, 2, m.metallic_factor);
     maps.normal = normal_map(asset, m);
     maps.emission = emission_map(asset, m, decode);
+    const int set = texture_uv_set(asset, static_cast<int>(all.size()));
+    if (!m.base_color) maps.base_color.uv_set = set;
+    if (!m.metallic_roughness) maps.roughness.uv_set = maps.metallic.uv_set = set;
+    if (!m.normal) maps.normal.uv_set = set;
     maps.alpha_mode = m.alpha_mode;
     maps.alpha_cutoff = m.alpha_cutoff;
     maps.double_sided = m.double_sided;

@@ -94,10 +94,16 @@ Map resized(const Map& map, int width, int height);
 void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::span<const MapSet> changed,
                   const std::filesystem::path& path);
 
-/// What `patina info` tells of the UVs of one material; texel figures on a 1024² raster of the unit tile (UVs
-/// wrapped).
+/// The UV set on which slots of a material get a texture that have none: set 0; where no mesh has area there,
+/// the set of the material's own textures.
+int texture_uv_set(const Asset& asset, int material);
+
+/// What `patina info` tells of the UVs of one material, on the set that its textures use or would use; texel
+/// figures on a 1024² raster of the unit tile (UVs wrapped).
 struct UvState {
-  bool missing = false;       // some primitive has no TEXCOORD_0
+  int uv_set = 0;
+  bool missing = false;       // no mesh part of the material has the set
+  int parts_without = 0;      // mesh parts that lack it
   float covered = 0;          // share of the tile that some triangle covers
   float overlapping = 0;      // share of the covered texels that more than one triangle covers
   float mirrored = 0;         // share of triangles in the minority winding

@@ -7,9 +7,9 @@
 
 #include "patina/asset/gltf_materials.h"
 #include "patina/asset/obj_text.h"
-#include "patina/asset/uri.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
+#include "patina/base/utf8.h"
 
 namespace patina::asset {
 namespace {
@@ -23,183 +23,161 @@ float roughness_of_exponent(float exponent) {
 class MtlReader {
  public:
   MtlReader(const std::string& asset_name, const std::filesystem::path& folder,
-            const std::filesystem::path& path, std::vector<std::string>& warnings)
+            const std::filesystem::path& relative)
       : folder_(folder),
-        library_(path),
-        name_(fmt::format("{}: material library {}", asset_name, path.filename().string())),
-        text_(read_text_file(path, uint64_t{1} << 26)),
-        warnings_(warnings) {}
+        base_(relative.parent_path()),
+        name_(fmt::format("{}: material library {}", asset_name, relative.filename().string())),
+        text_(read_mtl_text(folder / relative)) {}
 
-  std::map<std::string, MtlMaterial> read() {
+  MtlLibrary read() {
     for (const TextLine& line : text_lines(text_)) {
       line_ = &line;
       const std::string keyword = lowered(line.keyword);
-      if (keyword == "newmtl") {
-        current_ = &materials_[line.rest];
-        *current_ = MtlMaterial{};
-        current_->material.name = short_name(line.rest);
-        current_->material.metallic_factor = 0.0f;
-        current_->material.roughness_factor = roughness_of_exponent(0.0f);
-        has_roughness_ = false;
-        continue;
-      }
-      if (!current_) fail(fmt::format("'{}' stands before the first newmtl", printable(line.keyword, 40)));
-      statement(keyword);
+      if (keyword == "newmtl")
+        begin_material();
+      else if (current_)
+        statement(keyword);
+      // What stands before the first newmtl belongs to no material.
     }
-    return std::move(materials_);
+    return std::move(library_);
   }
 
  private:
   std::string where() const { return fmt::format("{}, line {}", name_, line_->number); }
-  [[noreturn]] void fail(const std::string& message) const {
-    throw Error(ErrorCode::kFormat, where(), message);
+  void note(const std::string& message) { library_.notes.push_back(where() + ": " + message); }
+
+  void begin_material() {
+    const bool is_new = !library_.materials.contains(line_->rest);
+    current_ = &library_.materials[line_->rest];
+    *current_ = MtlMaterial{};
+    if (!is_new) note("a material of this name is defined above; this definition counts");
+    current_->material.name = short_name(as_utf8(unquoted(line_->rest)));
+    current_->material.metallic_factor = 0.0f;
+    current_->material.roughness_factor = roughness_of_exponent(0.0f);
+    has_roughness_ = has_opacity_ = false;
   }
 
   void statement(const std::string& keyword) {
+    if (names_picture(keyword)) return picture(keyword);
     Material& m = current_->material;
-    if (keyword == "kd")
-      m.base_color_factor = vec4(color(), m.base_color_factor.a);
-    else if (keyword == "ke")
-      m.emissive_factor = color();
-    else if (keyword == "d")
-      set_alpha(value());
-    else if (keyword == "tr")
-      set_alpha(1.0f - value());
-    else if (keyword == "pr")
-      set_roughness(value());
-    else if (keyword == "pm")
-      m.metallic_factor = std::clamp(value(), 0.0f, 1.0f);
-    else if (keyword == "ns" && !has_roughness_)
-      m.roughness_factor = roughness_of_exponent(value());
-    else if (keyword == "map_kd")
-      current_->base_color = texture();
-    else if (keyword == "map_ke")
-      current_->emissive = texture();
-    else if (keyword == "map_pr")
-      current_->roughness = texture();
-    else if (keyword == "map_pm")
-      current_->metallic = texture();
-    else if (keyword == "norm" || keyword == "map_kn")
-      set_normal(false);
-    else if ((keyword == "map_bump" || keyword == "bump") && !current_->normal)
-      set_normal(true);
-    else if (keyword == "map_d")
-      warnings_.push_back(where() + ": map_d is not read; the material is opaque where d says so");
+    if (keyword == "kd") {
+      if (const auto value = color(1.0f)) m.base_color_factor = vec4(*value, m.base_color_factor.a);
+    } else if (keyword == "ke") {
+      if (const auto value = color(1e6f)) m.emissive_factor = *value;
+    } else if (keyword == "d") {
+      if (const auto value = single_value()) set_opacity(*value);
+      has_opacity_ = true;
+    } else if (keyword == "tr") {
+      transparency();
+    } else if (keyword == "pr") {
+      if (const auto value = single_value()) m.roughness_factor = std::clamp(*value, 0.0f, 1.0f);
+      has_roughness_ = true;
+    } else if (keyword == "pm") {
+      if (const auto value = single_value()) m.metallic_factor = std::clamp(*value, 0.0f, 1.0f);
+    } else if (keyword == "ns" && !has_roughness_) {
+      if (const auto value = single_value()) m.roughness_factor = roughness_of_exponent(*value);
+    }
   }
 
-  void set_normal(bool may_be_height) {
-    current_->normal = texture();
-    current_->normal_may_be_height = may_be_height;
-  }
-
-  void set_alpha(float alpha) {
+  void set_opacity(float opacity) {
     Material& m = current_->material;
-    m.base_color_factor.a = std::clamp(alpha, 0.0f, 1.0f);
+    m.base_color_factor.a = std::clamp(opacity, 0.0f, 1.0f);
     m.alpha_mode = m.base_color_factor.a < 1.0f ? AlphaMode::kBlend : AlphaMode::kOpaque;
   }
 
-  void set_roughness(float roughness) {
-    current_->material.roughness_factor = std::clamp(roughness, 0.0f, 1.0f);
-    has_roughness_ = true;
+  // Tr is 1 - d, and d decides where both stand. MeshLab and PhotoScan write 1 for an opaque material: one
+  // that is wholly invisible is never meant.
+  void transparency() {
+    const auto value = single_value();
+    if (!value || has_opacity_) return;
+    if (*value >= 1.0f) note("'Tr 1' is taken as opaque, as MeshLab and PhotoScan mean it");
+    set_opacity(*value >= 1.0f ? 1.0f : 1.0f - *value);
   }
 
-  float value_of(std::string_view word) const {
+  void picture(const std::string& keyword) {
+    if (keyword == "map_d") note("map_d is not read; the material is opaque where d says so");
+    const TextureStatement parsed = texture_statement(line_->rest);
+    if (parsed.file.empty()) return;  // an empty entry, as exporters write for unused slots
+    const auto found = find_named_file(folder_, base_, parsed.file);
+    if (found) library_.references.push_back(found->relative.string());
+    std::optional<MtlTexture>* slot = slot_of(keyword);
+    if (!slot) return;
+    const bool may_be_height = keyword == "map_bump" || keyword == "bump";
+    if (may_be_height && *slot) return;  // beside a normal map, or named twice
+    if (!found) {
+      note(fmt::format(
+          "the texture file '{}' is not in the asset's folder, so the material goes without it; put "
+          "it beside the library, or correct its name",
+          printable(parsed.file, 100)));
+      return;
+    }
+    if (!found->as_written)
+      note(fmt::format("the texture '{}' is taken from '{}'", printable(parsed.file, 100),
+                       printable(found->relative.string(), 100)));
+    *slot = MtlTexture{folder_ / found->relative, parsed};
+    if (slot == &current_->normal) current_->normal_may_be_height = may_be_height;
+  }
+
+  std::optional<MtlTexture>* slot_of(const std::string& keyword) {
+    if (keyword == "map_kd") return &current_->base_color;
+    if (keyword == "map_ke") return &current_->emissive;
+    if (keyword == "map_pr") return &current_->roughness;
+    if (keyword == "map_pm") return &current_->metallic;
+    if (keyword == "norm" || keyword == "map_kn" || keyword == "map_bump" || keyword == "bump")
+      return &current_->normal;
+    return nullptr;
+  }
+
+  std::optional<float> value_of(std::string_view word) {
     const auto found = number(word);
-    if (!found) fail(fmt::format("expected a number, found '{}'", printable(word, 40)));
-    return *found;
+    if (!found)
+      note(fmt::format("'{}' is left out: expected a number, found '{}'", line_->keyword,
+                       printable(word, 40)));
+    return found;
   }
 
-  float value() const {
+  std::optional<float> single_value() {
     const auto parts = words(line_->rest);
-    if (parts.empty()) fail("a number is missing");
-    return value_of(parts[0]);
+    return parts.empty() ? std::nullopt : value_of(parts[0]);
   }
 
   // MTL colours are those a modelling program shows: linear, as exporters write them; one number stands for
   // three.
-  vec3 color() const {
+  std::optional<vec3> color(float largest) {
     const auto parts = words(line_->rest);
-    if (parts.empty()) fail("a colour is missing");
-    if (parts[0] == "xyz" || parts[0] == "spectral")
-      fail("colours as spectra or XYZ are not read; write three numbers");
-    const float first = value_of(parts[0]);
-    const vec3 rgb = parts.size() >= 3 ? vec3(first, value_of(parts[1]), value_of(parts[2])) : vec3(first);
-    return glm::clamp(rgb, 0.0f, line_->keyword == "Ke" || line_->keyword == "ke" ? 1e6f : 1.0f);
-  }
-
-  // Options come first, the file name is the rest of the line and may hold blanks.
-  MtlTexture texture() const {
-    MtlTexture out;
-    std::string_view rest = line_->rest;
-    const auto next = [&] {
-      const auto parts = words(rest);
-      if (parts.empty()) return std::string_view();
-      const std::string_view word = parts[0];
-      rest = rest.substr(static_cast<size_t>(word.data() + word.size() - rest.data()));
-      return word;
-    };
-    const auto up_to_three = [&](vec2& values) {
-      for (int i = 0; i < 3; ++i) {
-        const auto parts = words(rest);
-        const auto found =
-            parts.size() > 1 ? number(parts[0]) : std::nullopt;  // the last word is the file's name
-        if (!found) return;
-        if (i < 2) values[i] = *found;
-        next();
-      }
-    };
-    while (words(rest).size() > 1 && words(rest)[0].starts_with('-')) {
-      const std::string_view option = next();
-      if (option == "-s")
-        up_to_three(out.scale);
-      else if (option == "-o")
-        up_to_three(out.offset);
-      else if (option == "-t") {
-        vec2 turbulence;
-        up_to_three(turbulence);
-      } else if (option == "-bm")
-        out.bump_scale = value_of(next());
-      else if (option == "-clamp")
-        out.clamp = next() == "on";
-      else if (option == "-mm") {
-        next();
-        next();
-      } else if (option == "-blendu" || option == "-blendv" || option == "-cc" || option == "-imfchan" ||
-                 option == "-texres" || option == "-boost" || option == "-type" || option == "-colorspace")
-        next();
-      else
-        fail(fmt::format("the texture option '{}' is unknown", printable(option, 40)));
+    if (parts.empty()) return std::nullopt;
+    if (parts[0] == "xyz" || parts[0] == "spectral") {
+      note("colours as spectra or XYZ are not read; write three numbers");
+      return std::nullopt;
     }
-    while (!rest.empty() && (rest.front() == ' ' || rest.front() == '\t')) rest.remove_prefix(1);
-    std::string reference(rest);
-    std::replace(reference.begin(), reference.end(), '\\', '/');  // written on Windows
-    // Names are relative to the library's own folder, which may lie below the asset's.
-    const std::filesystem::path library_folder = library_.parent_path().lexically_relative(folder_);
-    out.path = resolve_inside(
-        folder_, library_folder.empty() ? reference : (library_folder / reference).string(), where());
-    std::error_code ignored;
-    if (!std::filesystem::exists(out.path, ignored))
-      throw Error(ErrorCode::kNotFound, where(),
-                  fmt::format("the texture file '{}' does not exist", printable(reference)));
-    return out;
+    vec3 rgb(0.0f);
+    for (size_t i = 0; i < 3; ++i) {
+      const auto value = value_of(parts[parts.size() >= 3 ? i : 0]);
+      if (!value) return std::nullopt;
+      rgb[static_cast<glm::length_t>(i)] = *value;
+    }
+    return glm::clamp(rgb, 0.0f, largest);
   }
 
-  std::filesystem::path folder_, library_;
+  std::filesystem::path folder_, base_;
   std::string name_, text_;
-  std::vector<std::string>& warnings_;
-  std::map<std::string, MtlMaterial> materials_;
+  MtlLibrary library_;
   MtlMaterial* current_ = nullptr;
-  bool has_roughness_ = false;
+  bool has_roughness_ = false, has_opacity_ = false;
   const TextLine* line_ = nullptr;
 };
 
 }  // namespace
 
-std::map<std::string, MtlMaterial> read_mtl(const std::string& asset_name,
-                                            const std::filesystem::path& folder,
-                                            const std::filesystem::path& path,
-                                            std::vector<std::string>& warnings) {
-  return MtlReader(asset_name, folder, path, warnings).read();
+std::string read_mtl_text(const std::filesystem::path& path) {
+  std::string text = read_text_file(path, uint64_t{1} << 26);
+  auto converted = utf8_from_utf16({reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+  return converted ? *std::move(converted) : std::move(text);
+}
+
+MtlLibrary read_mtl(const std::string& asset_name, const std::filesystem::path& folder,
+                    const std::filesystem::path& relative) {
+  return MtlReader(asset_name, folder, relative).read();
 }
 
 }  // namespace patina::asset

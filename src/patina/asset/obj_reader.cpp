@@ -2,9 +2,13 @@
 // get one made from the polygons around their point, weighted by angle: OBJ files without normals nearly
 // always mean a smooth surface, unlike glTF, which prescribes flat shading there. Smoothing groups are not
 // read. One primitive a material (and a second for polygons without UVs).
+//
+// Two passes: all libraries and vertices first, then faces. So a usemtl may stand before its mtllib, and
+// positions become float only once their centre is known.
 #include "patina/asset/obj_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -14,13 +18,10 @@
 
 #include "patina/asset/geometry.h"
 #include "patina/asset/gltf_materials.h"
-#include "patina/asset/mtl_reader.h"
+#include "patina/asset/obj_materials.h"
 #include "patina/asset/obj_text.h"
 #include "patina/asset/polygon.h"
-#include "patina/asset/uri.h"
-#include "patina/base/files.h"
-#include "patina/image/image_header.h"
-#include "patina/image/image_io.h"
+#include "patina/base/utf8.h"
 
 namespace patina::asset {
 namespace {
@@ -51,26 +52,76 @@ struct Part {
   }
 };
 
+// What follows x y z on a vertex line: r g b, r g b a, w r g b or w r g b a.
+struct RawColor {
+  std::array<float, 5> values{};
+  size_t count = 0;
+};
+
+// Colours of a whole file, whose writer has put them all the same way.
+std::vector<vec4> vertex_colors(const std::vector<RawColor>& raw) {
+  bool four = false, first_is_one = true, last_is_one = true;
+  for (const RawColor& c : raw) {
+    if (c.count != 4) continue;
+    four = true;
+    first_is_one = first_is_one && c.values[0] == 1.0f;
+    last_is_one = last_is_one && c.values[3] == 1.0f;
+  }
+  // Four numbers are r g b a, unless the first is a weight of one everywhere and the last no alpha of one.
+  const bool has_weight = four && first_is_one && !last_is_one;
+  float largest = 0;
+  const auto color_of = [&](const RawColor& c) {
+    const size_t begin = c.count == 5 || (c.count == 4 && has_weight) ? 1 : 0;
+    const bool has_alpha = c.count == 5 || (c.count == 4 && !has_weight);
+    return vec4(c.values[begin], c.values[begin + 1], c.values[begin + 2],
+                has_alpha ? c.values[begin + 3] : -1.0f);
+  };
+  for (const RawColor& c : raw)
+    if (c.count >= 3) largest = std::max(largest, max_component(vec3(color_of(c))));
+  // Some write bytes. Alpha is a byte too then, unless it is one, which no writer of bytes means.
+  const float scale = largest > 1.0f ? 1.0f / 255.0f : 1.0f;
+  std::vector<vec4> out;
+  out.reserve(raw.size());
+  for (const RawColor& c : raw) {
+    vec4 color(1.0f);
+    if (c.count >= 3) {
+      color = color_of(c) * scale;
+      if (c.count == 3 || color.a < 0 || (scale != 1.0f && color.a == scale)) color.a = 1.0f;
+    }
+    out.push_back(glm::clamp(color, 0.0f, 1.0f));
+  }
+  return out;
+}
+
+// An index of a corner, and how many things of its kind stand above the line, from which negative ones count.
+struct Counts {
+  size_t positions = 0, uvs = 0, normals = 0;
+};
+
 class ObjReader {
  public:
   ObjReader(const std::filesystem::path& path, std::vector<uint8_t> file)
-      : document_(std::make_shared<SourceDocument>()) {
+      : document_(std::make_shared<SourceDocument>()), materials_(*document_, asset_) {
     document_->kind = SourceDocument::Kind::kObj;
     document_->path = path;
     document_->name = path.string();
     document_->file = std::move(file);
+    if (auto text = utf8_from_utf16(document_->file)) document_->converted = *std::move(text);
     asset_.path = path;
   }
 
   Asset read() {
-    const std::string_view text(reinterpret_cast<const char*>(document_->file.data()),
-                                document_->file.size());
-    for (const TextLine& line : text_lines(text)) {
-      line_ = &line;
-      statement(line);
+    const std::vector<TextLine> lines = text_lines(document_->obj_text());
+    for_each(lines, [&] { vertex_or_library(); });
+    materials_.end_libraries();
+    place_positions(lines);
+    if (!raw_color_.empty()) {
+      raw_color_.resize(position_.size());
+      color_ = vertex_colors(raw_color_);
     }
+    for_each(lines, [&] { face_or_material(); });
     for (auto& [key, part] : parts_) add_primitive(key.first, key.second, part);
-    if (asset_.materials.empty()) asset_.materials.push_back(default_material());
+    if (asset_.materials.empty()) materials_.nameless();
     asset_.source = document_;
     return std::move(asset_);
   }
@@ -86,82 +137,157 @@ class ObjReader {
       asset_.warnings.push_back(message);
   }
 
-  void statement(const TextLine& line) {
-    if (line.keyword == "v")
+  // Calls visit() with line_ on each line and above_ the counts of what stands above it.
+  template <class Visit>
+  void for_each(const std::vector<TextLine>& lines, Visit visit) {
+    above_ = {};
+    for (const TextLine& line : lines) {
+      line_ = &line;
+      visit();
+      above_.positions += line.keyword == "v";
+      above_.uvs += line.keyword == "vt";
+      above_.normals += line.keyword == "vn";
+    }
+  }
+
+  // ---- vertices and libraries ----
+
+  void vertex_or_library() {
+    if (line_->keyword == "v")
       add_vertex();
-    else if (line.keyword == "vt")
-      uv_.push_back([&] {
-        const auto v = numbers(1, 3);
-        return vec2(v[0], 1.0f - (v.size() > 1 ? v[1] : 0.0f));
-      }());
-    else if (line.keyword == "vn")
-      normal_.push_back([&] {
-        const auto v = numbers(3, 3);
-        return vec3(v[0], v[1], v[2]);
-      }());
-    else if (line.keyword == "f" || line.keyword == "fo")
+    else if (line_->keyword == "vt")
+      add_uv();
+    else if (line_->keyword == "vn")
+      add_normal();
+    else if (line_->keyword == "mtllib")
+      materials_.read_libraries(line_->rest, where());
+  }
+
+  void add_vertex() {
+    const auto parts = words(line_->rest);
+    if (parts.size() < 3) fail(fmt::format("'v' needs 3 numbers, found {}", parts.size()));
+    glm::dvec3 p;
+    for (size_t i = 0; i < 3; ++i) {
+      const auto value = wide_number(parts[i]);
+      if (!value || !std::isfinite(static_cast<float>(*value)))
+        fail(fmt::format("expected a finite number, found '{}'", printable(parts[i], 40)));
+      p[static_cast<glm::length_t>(i)] = *value;
+    }
+    wide_position_.push_back(p);
+    if (parts.size() < 6) return;
+    RawColor color;
+    for (; color.count < color.values.size() && color.count + 3 < parts.size(); ++color.count) {
+      const auto value = number(parts[color.count + 3]);
+      if (!value) return warn_once("vertex colours that are no numbers are left out");
+      color.values[color.count] = *value;
+    }
+    raw_color_.resize(wide_position_.size());
+    raw_color_.back() = color;
+  }
+
+  // Coordinates that are no numbers are as good as missing: a corner that names them has none.
+  void add_uv() {
+    const auto parts = words(line_->rest);
+    const auto u = parts.empty() ? std::nullopt : number(parts[0]);
+    const auto v = parts.size() > 1 ? number(parts[1]) : std::optional(0.0f);
+    if (!u || !v) warn_once(where() + ": texture coordinates that are no numbers are left out");
+    uv_usable_.push_back(u && v);
+    uv_.push_back(u && v ? vec2(*u, 1.0f - *v) : vec2(0.0f));
+  }
+
+  void add_normal() {
+    const auto parts = words(line_->rest);
+    vec3 n(0.0f);
+    for (size_t i = 0; i < 3; ++i) {
+      const auto value = i < parts.size() ? number(parts[i]) : std::nullopt;
+      if (!value) {
+        warn_once(where() + ": normals that are no numbers are made anew");
+        n = vec3(0.0f);
+        break;
+      }
+      n[static_cast<glm::length_t>(i)] = *value;
+    }
+    normal_.push_back(n);
+  }
+
+  // Positions relative to the centre of all that faces use, where that lies far away.
+  void place_positions(const std::vector<TextLine>& lines) {
+    Extent extent;
+    for_each(lines, [&] {
+      if (!is_face()) return;
+      for (const std::string_view word : words(line_->rest))
+        extent.add(wide_position_[corner_position(word.substr(0, word.find('/')))]);
+    });
+    asset_.origin = origin_for(extent);
+    position_.reserve(wide_position_.size());
+    for (const glm::dvec3& p : wide_position_) position_.emplace_back(p - asset_.origin);
+    wide_position_ = {};
+  }
+
+  // ---- faces ----
+
+  bool is_face() const { return line_->keyword == "f" || line_->keyword == "fo"; }
+
+  void face_or_material() {
+    if (is_face())
       add_face();
-    else if (line.keyword == "usemtl")
-      material_ = material_index(line.rest);
-    else if (line.keyword == "mtllib")
-      read_libraries();
-    else if (line.keyword == "p" || line.keyword == "l")
+    else if (line_->keyword == "usemtl")
+      material_ = line_->rest.empty() ? -1 : materials_.named(line_->rest);
+    else if (line_->keyword == "p" || line_->keyword == "l")
       warn_once("points and lines have no surface and are left out");
-    else if (line.keyword == "curv" || line.keyword == "surf")
+    else if (line_->keyword == "curv" || line_->keyword == "surf")
       warn_once("free-form curves and surfaces are left out; only polygons are read");
   }
 
-  std::vector<float> numbers(size_t at_least, size_t at_most) const {
-    std::vector<float> out;
-    for (const std::string_view word : words(line_->rest)) {
-      if (out.size() == at_most) break;
-      const auto value = number(word);
-      if (!value) fail(fmt::format("expected a finite number, found '{}'", printable(word, 40)));
-      out.push_back(*value);
-    }
-    if (out.size() < at_least)
-      fail(fmt::format("'{}' needs {} numbers, found {}", line_->keyword, at_least, out.size()));
-    return out;
-  }
-
-  // x y z, x y z w, x y z r g b or x y z w r g b; colours are shown as they are, that is sRGB in most
-  // programs but by no standard.
-  void add_vertex() {
-    const auto v = numbers(3, 7);
-    position_.emplace_back(v[0], v[1], v[2]);
-    if (v.size() >= 6) {
-      const size_t first = v.size() == 7 ? 4 : 3;
-      color_.resize(position_.size(), vec4(1.0f));
-      color_.back() = vec4(glm::clamp(vec3(v[first], v[first + 1], v[first + 2]), 0.0f, 1.0f), 1.0f);
-    }
-  }
-
-  // One index of a corner: from 1, or from the end when negative.
-  uint32_t resolved(std::string_view text, size_t count, std::string_view of_what) const {
-    if (text.empty()) return kNone;
+  // An index from 1, or from the end of what stands above when negative; nothing where it names none.
+  std::optional<uint32_t> resolved(std::string_view text, size_t total, size_t above,
+                                   std::string_view of_what) const {
     int64_t value = 0;
     const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (failure != std::errc() || end != text.data() + text.size())
       fail(fmt::format("expected a {} index, found '{}'", of_what, printable(text, 40)));
-    const int64_t index = value > 0 ? value - 1 : static_cast<int64_t>(count) + value;
-    if (value == 0 || index < 0 || index >= static_cast<int64_t>(count))
-      fail(fmt::format("{} index {} does not lie in 1 to {}", of_what, value, count));
+    const int64_t index = value > 0 ? value - 1 : static_cast<int64_t>(above) + value;
+    if (value == 0 || index < 0 || index >= static_cast<int64_t>(total)) return std::nullopt;
     return static_cast<uint32_t>(index);
   }
 
-  Corner corner_of(std::string_view word) const {
+  uint32_t corner_position(std::string_view text) const {
+    if (text.empty()) fail("a corner has no vertex index");
+    const size_t total = std::max(position_.size(), wide_position_.size());
+    const auto index = resolved(text, total, above_.positions, "vertex");
+    if (!index) fail(fmt::format("vertex index {} does not lie in 1 to {}", text, total));
+    return *index;
+  }
+
+  Corner corner_of(std::string_view word) {
     const size_t first = word.find('/');
     const size_t second = first == std::string_view::npos ? first : word.find('/', first + 1);
     Corner corner;
-    corner.position = resolved(word.substr(0, first), position_.size(), "vertex");
-    if (corner.position == kNone) fail("a corner has no vertex index");
-    if (first != std::string_view::npos)
-      corner.uv =
-          resolved(word.substr(first + 1, second == std::string_view::npos ? second : second - first - 1),
-                   uv_.size(), "texture coordinate");
-    if (second != std::string_view::npos)
-      corner.normal = resolved(word.substr(second + 1), normal_.size(), "normal");
+    corner.position = corner_position(word.substr(0, first));
+    if (first != std::string_view::npos) {
+      const size_t length = second == std::string_view::npos ? second : second - first - 1;
+      corner.uv = corner_uv(word.substr(first + 1, length));
+    }
+    if (second != std::string_view::npos) corner.normal = corner_normal(word.substr(second + 1));
     return corner;
+  }
+
+  // A file without any texture coordinates may name them; an index past those that there are is a fault that
+  // would tear the texture.
+  uint32_t corner_uv(std::string_view text) {
+    if (text.empty()) return kNone;
+    const auto index = resolved(text, uv_.size(), above_.uvs, "texture coordinate");
+    if (!index && !uv_.empty())
+      fail(fmt::format("texture coordinate index {} does not lie in 1 to {}", text, uv_.size()));
+    if (!index) warn_once("faces name texture coordinates, but the file has none");
+    return index && uv_usable_[*index] ? *index : kNone;
+  }
+
+  uint32_t corner_normal(std::string_view text) {
+    if (text.empty()) return kNone;
+    const auto index = resolved(text, normal_.size(), above_.normals, "normal");
+    if (!index) warn_once("faces name normals that the file does not have; they are made");
+    return index.value_or(kNone);
   }
 
   void add_face() {
@@ -204,155 +330,15 @@ class ObjReader {
     }
   }
 
-  int material_index(const std::string& name) {
-    const auto known = material_numbers_.find(name);
-    if (known != material_numbers_.end()) return known->second;
-    warn_once(
-        fmt::format("material '{}' is not in any material library that was read; it gets default values",
-                    printable(name, 60)));
-    Material material = default_material();
-    material.name = short_name(name);
-    material.metallic_factor = 0.0f;
-    return add_material(name, std::move(material));
-  }
+  // ---- primitives ----
 
-  int add_material(const std::string& name, Material material) {
-    const int index = static_cast<int>(asset_.materials.size());
-    asset_.materials.push_back(std::move(material));
-    material_numbers_[name] = index;
-    return index;
-  }
-
-  int default_index() {
-    if (default_material_ < 0) {
-      default_material_ = static_cast<int>(asset_.materials.size());
-      asset_.materials.push_back(default_material());
-      asset_.materials.back().metallic_factor = 0.0f;
-    }
-    return default_material_;
-  }
-
-  // The rest of the line is one name with blanks if such a file exists, else several names.
-  void read_libraries() {
-    std::string rest = line_->rest;
-    std::replace(rest.begin(), rest.end(), '\\', '/');
-    std::vector<std::string> names{rest};
-    std::error_code ignored;
-    if (words(rest).size() > 1 &&
-        !std::filesystem::exists(resolve_inside(document_->folder(), rest, where()), ignored)) {
-      names.clear();
-      for (const auto word : words(rest)) names.emplace_back(word);
-    }
-    for (const std::string& name : names) {
-      const auto path = resolve_inside(document_->folder(), name, where());
-      if (!std::filesystem::exists(path, ignored)) {
-        warn_once(fmt::format("{}: the material library '{}' does not exist", where(), printable(name, 100)));
-        continue;
-      }
-      document_->mtl_references.push_back(name);
-      document_->references.push_back(name);
-      for (auto& [material_name, mtl] : read_mtl(document_->name, document_->folder(), path, asset_.warnings))
-        if (!material_numbers_.contains(material_name))
-          add_material(material_name, with_textures(std::move(mtl)));
-    }
-  }
-
-  int image_index(const std::filesystem::path& path) {
-    const std::string key = path.lexically_normal().string();
-    const auto known = images_.find(key);
-    if (known != images_.end()) return known->second;
-    const auto bytes = read_file(path);
-    const std::string where = document_->name + ": texture " + path.filename().string();
-    const ImageHeader header = inspect_image(bytes, where);
-    document_->references.push_back(path.lexically_relative(document_->folder()).string());
-    image_bytes_ += uint64_t{4} * static_cast<uint64_t>(header.width) * static_cast<uint64_t>(header.height) *
-                    static_cast<uint64_t>(header.channels);
-    encoded_bytes_ += bytes.size();
-    if (image_bytes_ > memory_budget(document_->file.size() + encoded_bytes_).image_bytes)
-      throw Error(ErrorCode::kLimit, where,
-                  "the images up to this one decode to more memory than files of this size may");
-    return images_[key] = add_image(decode_image(bytes, where), path.stem().string());
-  }
-
-  int add_image(Image image, const std::string& name) {
-    asset_.images.push_back(std::move(image));
-    asset_.image_names.push_back(short_name(name));
-    return static_cast<int>(asset_.images.size()) - 1;
-  }
-
-  TextureRef texture_ref(const MtlTexture& texture) {
-    TextureRef ref;
-    ref.image = image_index(texture.path);
-    // MTL scales and shifts v upwards; patina's v points down.
-    ref.uv_transform = mat3(vec3(texture.scale.x, 0, 0), vec3(0, texture.scale.y, 0),
-                            vec3(texture.offset.x, 1.0f - texture.scale.y - texture.offset.y, 1));
-    if (texture.clamp) ref.wrap_s = ref.wrap_t = Wrap::kClampToEdge;
-    return ref;
-  }
-
-  Material with_textures(MtlMaterial mtl) {
-    Material m = std::move(mtl.material);
-    if (mtl.base_color) {
-      // Where a colour map is given, most programs show it alone; a black Kd beside it is common and means
-      // nothing.
-      m.base_color = texture_ref(*mtl.base_color);
-      m.base_color_factor = vec4(vec3(1.0f), m.base_color_factor.a);
-    }
-    if (mtl.emissive) {
-      m.emissive = texture_ref(*mtl.emissive);
-      if (m.emissive_factor == vec3(0.0f)) m.emissive_factor = vec3(1.0f);
-    }
-    if (mtl.normal) {
-      const TextureRef ref = texture_ref(*mtl.normal);
-      if (mtl.normal_may_be_height && is_height(asset_.images[static_cast<size_t>(ref.image)])) {
-        warn_once(fmt::format(
-            "material '{}': its bump map is a height field, which is not read; use a normal map ('norm')",
-            printable(m.name, 60)));
-      } else {
-        m.normal = ref;
-        m.normal_scale = mtl.normal->bump_scale;
-      }
-    }
-    if (mtl.roughness || mtl.metallic) pack_roughness_metallic(mtl, m);
-    return m;
-  }
-
-  // A grey picture is a height field, a bluish one a normal map.
-  static bool is_height(const Image& image) {
-    if (image.channels < 3) return true;
-    double red = 0, blue = 0;
-    for (size_t i = 0; i < image.num_pixels(); ++i) {
-      red += image.pixels[i * static_cast<size_t>(image.channels)];
-      blue += image.pixels[i * static_cast<size_t>(image.channels) + 2];
-    }
-    return blue < 1.1 * red;
-  }
-
-  // glTF wants roughness in green and metallic in blue of one image; MTL has an image each.
-  void pack_roughness_metallic(const MtlMaterial& mtl, Material& m) {
-    const MtlTexture& placed = mtl.roughness ? *mtl.roughness : *mtl.metallic;
-    const auto grey = [&](const std::optional<MtlTexture>& texture) {
-      return texture ? &asset_.images[static_cast<size_t>(image_index(texture->path))] : nullptr;
-    };
-    grey(mtl.roughness),
-        grey(mtl.metallic);  // read both before taking addresses: reading may move the images
-    const Image* roughness = grey(mtl.roughness);
-    const Image* metallic = grey(mtl.metallic);
-    const int width = std::max(roughness ? roughness->width : 1, metallic ? metallic->width : 1);
-    const int height = std::max(roughness ? roughness->height : 1, metallic ? metallic->height : 1);
-    Image packed(width, height, 3, 1.0f);
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x) {
-        const auto nearest = [&](const Image& image) {
-          return image.at(x * image.width / width, y * image.height / height)[0];
-        };
-        if (roughness) packed.at(x, y)[1] = nearest(*roughness);
-        if (metallic) packed.at(x, y)[2] = nearest(*metallic);
-      }
-    m.metallic_roughness = texture_ref(placed);
-    m.metallic_roughness.image = add_image(std::move(packed), "roughness_metallic");
-    if (roughness) m.roughness_factor = 1.0f;
-    if (metallic) m.metallic_factor = 1.0f;
+  vec3 normal_of(const Corner& corner) const {
+    vec3 n(0.0f);
+    if (corner.normal != kNone) n = normal_[corner.normal];
+    const bool is_given = n != vec3(0.0f);
+    if (!is_given && corner.position < smooth_.size()) n = vec3(glm::normalize(smooth_[corner.position]));
+    const float length = glm::length(n);
+    return length > 0.0f && std::isfinite(length) ? n / length : vec3(0.0f);
   }
 
   void add_primitive(int material, bool has_uv, const Part& part) {
@@ -362,42 +348,38 @@ class ObjReader {
     for (const Corner& corner : part.corners) {
       g.position.push_back(position_[corner.position]);
       if (has_uv) g.uv[0].push_back(uv_[corner.uv]);
-      vec3 n(0.0f);
-      if (corner.normal != kNone)
-        n = normal_[corner.normal];
-      else if (corner.position < smooth_.size())
-        n = vec3(glm::normalize(smooth_[corner.position]));
-      const float length = glm::length(n);
-      g.normal.push_back(length > 0.0f && std::isfinite(length) ? n / length : vec3(0.0f));
+      g.normal.push_back(normal_of(corner));
       smooth = smooth || g.normal.back() == vec3(0.0f);
-      if (!color_.empty())
-        g.color.push_back(corner.position < color_.size() ? color_[corner.position] : vec4(1.0f));
+      if (!color_.empty()) g.color.push_back(color_[corner.position]);
     }
     g.triangles = part.triangles;
     if (smooth) make_smooth_normals(g);
-    const int index = material >= 0 ? material : default_index();
+    const int index = material >= 0 ? material : materials_.nameless();
     if (has_uv) {
       std::vector<vec2> uv = g.uv[0];
       for (vec2& t : uv)
         t = vec2(asset_.materials[static_cast<size_t>(index)].normal.uv_transform * vec3(t, 1.0f));
       g = with_mikktspace_tangents(g, uv);
     }
-    asset_.primitives.push_back({document_->path.stem().string(), index, std::move(g.position),
+    asset_.primitives.push_back({as_utf8(document_->path.stem().string()), index, std::move(g.position),
                                  std::move(g.normal), std::move(g.tangent), std::move(g.uv),
                                  std::move(g.color), std::move(g.triangles)});
   }
 
   std::shared_ptr<SourceDocument> document_;
   Asset asset_;
+  ObjMaterials materials_;
   const TextLine* line_ = nullptr;
+  Counts above_;
+  std::vector<glm::dvec3> wide_position_;  // as the file has them, until their centre is known
   std::vector<vec3> position_, normal_;
   std::vector<vec2> uv_;
+  std::vector<bool> uv_usable_;
+  std::vector<RawColor> raw_color_;
   std::vector<vec4> color_;
   std::vector<glm::dvec3> smooth_;
   std::map<std::pair<int, bool>, Part> parts_;
-  std::map<std::string, int> material_numbers_, images_;
-  uint64_t image_bytes_ = 0, encoded_bytes_ = 0;
-  int material_ = -1, default_material_ = -1;
+  int material_ = -1;
 };
 
 }  // namespace

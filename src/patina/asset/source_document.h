@@ -43,12 +43,18 @@ struct SourceDocument {
       references;  // decoded relative paths of all other files that the asset names, found or not
 
   // OBJ
+  std::string converted;                    // the text as UTF-8 where the file is UTF-16
   std::vector<std::string> mtl_references;  // relative paths of the material libraries that were found
+  std::vector<std::string> material_names;  // one a material, as the file spells it; "" for faces without one
 
   std::filesystem::path folder() const { return path.parent_path(); }
   std::string_view json_text() const {
     return std::string_view(reinterpret_cast<const char*>(file.data()), file.size())
         .substr(json_begin, json_end - json_begin);
+  }
+  std::string_view obj_text() const {
+    return converted.empty() ? std::string_view(reinterpret_cast<const char*>(file.data()), file.size())
+                             : std::string_view(converted);
   }
   JsonView root() const { return JsonView(json, name); }
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patina/asset/geometry.h"
 #include "patina/asset/material_maps.h"
 
 namespace patina::asset {
@@ -57,7 +58,7 @@ struct Counts {
 };
 
 void count(const Primitive& primitive, UvState& state, Counts& counts) {
-  const auto& uv = primitive.uv[0];
+  const auto& uv = primitive.uv[static_cast<size_t>(state.uv_set)];
   for (const uvec3& t : primitive.triangles) {
     std::array<glm::dvec2, 3> corners;
     bool usable = true;
@@ -83,23 +84,47 @@ void count(const Primitive& primitive, UvState& state, Counts& counts) {
   }
 }
 
+// The set of the textures that a fit changes, in the order of how much they show; -1: there is none.
+int own_uv_set(const Material& m) {
+  for (const TextureRef* ref : {&m.base_color, &m.metallic_roughness, &m.normal})
+    if (*ref) return ref->uv_set;
+  return -1;
+}
+
+bool has_area_on(const Asset& asset, int material, int set) {
+  return std::any_of(asset.primitives.begin(), asset.primitives.end(), [&](const Primitive& p) {
+    return p.material == material && static_cast<size_t>(set) < p.uv.size() &&
+           has_uv_area(p.uv[static_cast<size_t>(set)], p.triangles);
+  });
+}
+
 }  // namespace
+
+int texture_uv_set(const Asset& asset, int material) {
+  const int own = own_uv_set(asset.materials[static_cast<size_t>(material)]);
+  if (own <= 0 || has_area_on(asset, material, 0)) return 0;
+  return has_area_on(asset, material, own) ? own : 0;
+}
 
 std::vector<UvState> uv_states(const Asset& asset) {
   std::vector<UvState> states(asset.materials.size());
   for (size_t m = 0; m < states.size(); ++m) {
     UvState& state = states[m];
+    const int own = own_uv_set(asset.materials[m]);
+    state.uv_set = own >= 0 ? own : texture_uv_set(asset, static_cast<int>(m));
     Counts counts;
-    bool used = false;
+    int parts_with = 0;
     for (const Primitive& primitive : asset.primitives) {
       if (primitive.material != static_cast<int>(m) || primitive.triangles.empty()) continue;
-      used = true;
-      if (primitive.uv.empty())
-        state.missing = true;
-      else
+      if (static_cast<size_t>(state.uv_set) >= primitive.uv.size()) {
+        ++state.parts_without;
+      } else {
+        ++parts_with;
         count(primitive, state, counts);
+      }
     }
-    if (!used || counts.triangles == 0) continue;
+    state.missing = parts_with == 0 && state.parts_without > 0;
+    if (counts.triangles == 0) continue;
     size_t covered = 0, overlapping = 0;
     for (const uint8_t hit : counts.raster.hits) covered += hit > 0, overlapping += hit > 1;
     const auto share = [](size_t part, size_t whole) {
