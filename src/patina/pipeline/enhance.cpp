@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "patina/asset/export.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
@@ -15,12 +16,23 @@ namespace patina::pipeline {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+namespace {
+
+// Refuses at the start what export would refuse at the end.
+void check_export(const Workbench& bench, const fs::path& output, const Progress& progress) {
+  if (output.empty()) return;
+  for (const std::string& note : asset::plan_export(bench.asset, output).notes) progress.warn(note);
+}
+
+}  // namespace
+
 void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   check_inputs(config);
   ResolvedModel model(config.edit);
   write_config(config, run);
-  const Workbench bench = open_workbench(config.inputs, progress);                // asset, scene, cameras
+  const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
+  check_export(bench, config.output, progress);
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
   const std::vector<Image> edited = edit_stage(bench, views, config.edit, model, run, progress);  // → detail/
   model.unload();
@@ -34,6 +46,7 @@ void run_render(Config config, RunFolder& run, const RunProgress& progress) {
   check_output(config.output);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);
+  check_export(bench, config.output, progress);
   render_stage(bench, config.render, run, progress);
 }
 
@@ -50,6 +63,7 @@ void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
   check_output(config.output);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);
+  check_export(bench, config.output, progress);
   const RenderedViews views = load_views(bench, run);
   const std::vector<Image> edited = load_edited(views, run);
   write_output(bench, fit_stage(bench, views, edited, config.fit, run, progress), config.output);

@@ -32,8 +32,10 @@ std::string describe_texture(const asset::Asset& asset, const char* slot, const 
 
 std::string describe_uv(const asset::UvState& uv) {
   if (uv.missing) return "missing: unwrap the mesh before enhancing it (Blender: U, Smart UV Project)";
-  std::string text = fmt::format("cover {:.0f} % of the tile, from ({:.3g}, {:.3g}) to ({:.3g}, {:.3g})",
-                                 100 * uv.covered, uv.min.x, uv.min.y, uv.max.x, uv.max.y);
+  std::string text = uv.uv_set > 0 ? fmt::format("of set {} ", uv.uv_set) : "";
+  text += fmt::format("cover {:.0f} % of the tile, from ({:.3g}, {:.3g}) to ({:.3g}, {:.3g})",
+                      100 * uv.covered, uv.min.x, uv.min.y, uv.max.x, uv.max.y);
+  if (uv.parts_without > 0) text += fmt::format("; {} mesh part(s) have none", uv.parts_without);
   if (uv.zero_area > 0.005f)
     text += fmt::format("; {:.0f} % of the triangles have no UV area", 100 * uv.zero_area);
   if (uv.overlapping > 0.01f)
@@ -103,7 +105,8 @@ std::string describe_image(const fs::path& path) {
 }
 
 std::string describe_environment(const fs::path& path) {
-  const Image image = read_hdr(path);
+  const HdrImage hdr = read_hdr_with_notes(path);
+  const Image& image = hdr.image;
   vec3 mean(0.0f);
   float largest = 0;
   for (size_t i = 0; i < image.num_pixels(); ++i) {
@@ -111,9 +114,11 @@ std::string describe_environment(const fs::path& path) {
     mean += value / static_cast<float>(image.num_pixels());
     largest = std::max(largest, max_component(value));
   }
-  return fmt::format(
+  std::string text = fmt::format(
       "{}\n  environment map, {} x {} pixels, mean radiance ({:.3g}, {:.3g}, {:.3g}), largest {:.4g}\n",
       printable(path.string()), image.width, image.height, mean.x, mean.y, mean.z, largest);
+  for (const std::string& note : hdr.notes) text += "  note: " + printable(note, 400) + "\n";
+  return text;
 }
 
 std::string describe_weights(const fs::path& path) {

@@ -46,6 +46,19 @@ json coverage_metrics(const Workbench& bench, const RunProgress& progress,
   return {{"coverage", seen}, {"coverage_twice", views::seen_share(*bench.scene, bench.cameras, 2)}};
 }
 
+// A run that cannot change anything ends before diffusion starts.
+void require_seen(const Workbench& bench, const views::ViewSet& set) {
+  for (const views::View& view : set.views)
+    for (const auto material : view.gbuffer.material)
+      if (material >= 0 && static_cast<size_t>(material) < bench.enhanced.size() &&
+          bench.enhanced[static_cast<size_t>(material)])
+        return;
+  throw Error(
+      ErrorCode::kFormat, bench.asset.path.string(),
+      "no pixel of any view shows a material that may change, so nothing would be enhanced; check the "
+      "cameras, the materials that were chosen, and whether faces point outwards");
+}
+
 }  // namespace
 
 RenderedViews render_stage(const Workbench& bench, const RenderSettings& settings, RunFolder& run,
@@ -70,6 +83,8 @@ RenderedViews render_stage(const Workbench& bench, const RenderSettings& setting
     }
     json cameras = cameras_to_json(bench.cameras);
     cameras["exposure_ev"] = set.exposure_ev;
+    const glm::dvec3& origin = bench.asset.origin;
+    if (origin != glm::dvec3(0.0)) cameras["origin"] = {origin.x, origin.y, origin.z};
     write_json(run.file("views/cameras.json"), cameras);
     result.outputs.push_back("views/cameras.json");
     result.metrics = coverage_metrics(bench, progress, result.warnings);
@@ -98,6 +113,7 @@ RenderedViews load_views(const Workbench& bench, const RunFolder& run) {
                                .radiance = {},
                                .coverage = {}});
   }
+  require_seen(bench, views.set);
   return views;
 }
 

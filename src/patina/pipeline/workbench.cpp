@@ -8,6 +8,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/image/image_io.h"
 #include "patina/pipeline/run_folder.h"
 
 namespace patina::pipeline {
@@ -120,6 +121,10 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const std::vector<
       warnings.push_back(fmt::format("Material '{}' {} and stays as it is.", name, fault));
       continue;
     }
+    if (uv.parts_without > 0)
+      warnings.push_back(fmt::format(
+          "Material '{}': {} of its mesh parts have no UVs (set {}), so its new textures cannot lie on them.",
+          name, uv.parts_without, uv.uv_set));
     if (uv.overlapping > 0.05f)
       warnings.push_back(
           fmt::format("Material '{}': {:.0f} % of its texels are shared by several places of the surface, "
@@ -144,6 +149,13 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const std::vector<
   return wanted;
 }
 
+render::Environment open_environment(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (path.empty()) return render::studio_environment();
+  HdrImage hdr = read_hdr_with_notes(path);
+  warnings.insert(warnings.end(), hdr.notes.begin(), hdr.notes.end());
+  return render::Environment(std::move(hdr.image));
+}
+
 }  // namespace
 
 Workbench open_workbench(const InputSettings& inputs, const Progress& progress) {
@@ -152,16 +164,16 @@ Workbench open_workbench(const InputSettings& inputs, const Progress& progress) 
   asset::require_enhanceable(bench.asset);
   bench.warnings = bench.asset.warnings;
   bench.enhanced = choose_materials(bench.asset, inputs.materials, bench.warnings);
-  for (const std::string& warning : bench.warnings) progress.warn(warning);
   bench.maps = asset::resolve_materials(bench.asset);
 
   std::vector<asset::MaterialMaps> context_maps;
   if (!inputs.scene.empty()) {
     bench.context = std::make_unique<asset::Asset>(asset::read_asset(inputs.scene));
+    asset::set_origin(*bench.context, bench.asset.origin);
     context_maps = asset::resolve_materials(*bench.context);
   }
-  render::Environment environment = inputs.environment.empty() ? render::studio_environment()
-                                                               : render::read_environment(inputs.environment);
+  render::Environment environment = open_environment(inputs.environment, bench.warnings);
+  for (const std::string& warning : bench.warnings) progress.warn(warning);
 
   Hasher hasher;
   add_asset(hasher, bench.asset, bench.maps);
@@ -169,7 +181,7 @@ Workbench open_workbench(const InputSettings& inputs, const Progress& progress) 
   hasher.add(environment.map().pixels);
 
   if (!inputs.cameras.empty()) {
-    bench.cameras = cameras_from_json(read_json(inputs.cameras), inputs.cameras.string());
+    bench.cameras = cameras_from_json(read_json(inputs.cameras), inputs.cameras.string(), bench.asset.origin);
   } else {
     if (inputs.orbit.resolution % 8 != 0)
       throw Error(ErrorCode::kUsage, "resolution",
@@ -199,9 +211,14 @@ json cameras_to_json(std::span<const render::Camera> cameras) {
   return {{"cameras", list}};
 }
 
-std::vector<render::Camera> cameras_from_json(const json& values, const std::string& context) {
+std::vector<render::Camera> cameras_from_json(const json& values, const std::string& context,
+                                              const glm::dvec3& origin) {
   std::vector<render::Camera> cameras;
   try {
+    glm::dvec3 file_origin(0.0);
+    if (values.contains("origin"))
+      for (int i = 0; i < 3; ++i)
+        file_origin[i] = values.at("origin").at(static_cast<size_t>(i)).get<double>();
     for (const json& entry : values.at("cameras")) {
       render::Camera camera;
       const json& matrix = entry.at("world_from_camera");
@@ -210,6 +227,9 @@ std::vector<render::Camera> cameras_from_json(const json& values, const std::str
                     fmt::format("world_from_camera: expected 16 numbers, found {}", matrix.size()));
       for (int i = 0; i < 16; ++i)
         camera.world_from_camera[i / 4][i % 4] = matrix[static_cast<size_t>(i)].get<float>();
+      for (int i = 0; i < 3; ++i)
+        camera.world_from_camera[3][i] = static_cast<float>(
+            matrix[static_cast<size_t>(12 + i)].get<double>() + (file_origin[i] - origin[i]));
       camera.fov_y = glm::radians(entry.at("fov_degrees").get<float>());
       camera.width = entry.at("width").get<int>();
       camera.height = entry.at("height").get<int>();

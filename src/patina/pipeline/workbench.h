@@ -34,11 +34,13 @@ struct Workbench {
 /// has). Warns of what will not come out well.
 Workbench open_workbench(const InputSettings& inputs, const Progress& progress);
 
-/// Cameras as JSON: {"cameras": [{"world_from_camera": 16 numbers column by column, "fov_degrees", "width",
-/// "height"}], ...}.
+/// Cameras as JSON, relative to the asset's origin: {"cameras": [{"world_from_camera": 16 numbers column by
+/// column, "fov_degrees", "width", "height"}], ...}.
 nlohmann::json cameras_to_json(std::span<const render::Camera> cameras);
-/// Throws Error{kFormat} naming the file and what is wrong: the number must be square, sizes equal and
-/// multiples of 8.
-std::vector<render::Camera> cameras_from_json(const nlohmann::json& json, const std::string& context);
+/// Cameras relative to `origin` (asset::Asset::origin); the file's are relative to its own "origin", or to
+/// that of the world. Throws Error{kFormat} naming the file and what is wrong: the number must be square,
+/// sizes equal and multiples of 8.
+std::vector<render::Camera> cameras_from_json(const nlohmann::json& json, const std::string& context,
+                                              const glm::dvec3& origin = glm::dvec3(0.0));
 
 }  // namespace patina::pipeline
