@@ -25,6 +25,7 @@
 #include "aged.h"
 #include "export_scene.h"
 #include "path_replay_fit.h"
+#include "patina/asset/map_slots.h"
 #include "patina/base/files.h"
 #include "patina/base/memory.h"
 #include "patina/image/image_io.h"
@@ -56,9 +57,9 @@ struct Options {
 void draw(const test::Recovery& r, const fs::path& folder, const std::string& name) {
   fs::create_directories(folder);
   write_image(folder / (name + "_views.png"), test::view_strip(r, 3, 256));
-  write_image(folder / (name + "_base_color.png"), test::texture_strip(r, 0, 384));
-  write_image(folder / (name + "_roughness.png"), test::texture_strip(r, 1, 384));
-  write_image(folder / (name + "_normal.png"), test::texture_strip(r, 3, 384));
+  for (const asset::MapSlot slot :
+       {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal})
+    write_image(folder / (name + "_" + asset::row_of(slot).name + ".png"), test::texture_strip(r, slot, 384));
 }
 
 json measured(const test::Recovery& r) {

@@ -269,13 +269,12 @@ Image view_strip(const Recovery& r, size_t view, int samples_per_pixel) {
   return paste(images);
 }
 
-Image texture_strip(const Recovery& r, int slot, int size) {
+Image texture_strip(const Recovery& r, asset::MapSlot slot, int size) {
   const size_t m = seen_material(r);
   std::vector<Image> images;
   for (const auto* maps : {&r.truth, &r.start, &r.fit.maps}) {
-    const auto kind = static_cast<asset::MapSlot>(slot);
-    const Image texels = asset::resized(asset::slot_map((*maps)[m], kind), size, size).texels;
-    const Image picture = asset::picture_of(texels, asset::row_of(kind).encoding);
+    const Image texels = asset::resized(asset::slot_map((*maps)[m], slot), size, size).texels;
+    const Image picture = asset::picture_of(texels, asset::row_of(slot).encoding);
     Image shown(size, size, 3);
     for (size_t i = 0; i < shown.num_pixels(); ++i)
       for (size_t c = 0; c < 3; ++c)

@@ -54,6 +54,6 @@ double sharpness_kept(const Recovery& recovery, const RecoveryOptions& options);
 
 /// True, starting and recovered views side by side, and the same of one map's texels as they are shown.
 Image view_strip(const Recovery& recovery, size_t view, int samples_per_pixel);
-Image texture_strip(const Recovery& recovery, int slot, int size);
+Image texture_strip(const Recovery& recovery, asset::MapSlot slot, int size);
 
 }  // namespace patina::test
