@@ -209,7 +209,7 @@ TEST(Training, goes_from_pictures_to_a_model_that_edits) {
   const test::TemporaryFolder folder;
   const fs::path work = folder.path() / "work", model = small_model(folder.path() / "model");
   write_samples(work / "training", 4);
-  write_samples(work / "held_out", 8);
+  write_samples(work / "held_out", 2);
   RunOptions run;
   run.minutes = 1.0 / 60;
   train_vae(work, model, {.run = run, .batch = 2, .side = 32});

@@ -170,7 +170,7 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     }
     write_file(step_file, std::to_string(run.step()));
     const c10::InferenceMode inference;
-    const Networks averaged = networks_of(stores, configs, at::kBFloat16);
+    const Networks averaged = networks_of(stores, configs, training_type(options.device));
     std::printf("velocity error held out (with others' words, on training views):");
     for (const int64_t time : {50, 200, 400, 600, 800, 950}) {
       const ViewErrors unseen = view_errors(averaged, held_out, alphas_cumprod, time, options.device);
@@ -203,7 +203,7 @@ void train_denoiser(const fs::path& work, const fs::path& model, const DenoiserT
     const at::Tensor normal_scale = (at::rand({count}, device) >= kNormalDropout).to(at::kFloat);
 
     const at::Tensor noise = at::randn_like(batch.latents);
-    const Networks networks = networks_of(stores, configs, at::kBFloat16);
+    const Networks networks = networks_of(stores, configs, training_type(options.device));
     std::mutex mutex;
     double mean_error = 0, mean_loss = 0;
     in_shares(options.run.workers, count, [&](int64_t begin, int64_t end) {

@@ -7,6 +7,7 @@
 #include <c10/core/GradMode.h>
 #include <torch/version.h>
 
+#include "patina/base/bf16.h"
 #include "patina/base/error.h"
 #include "workers.h"
 
@@ -90,10 +91,10 @@ bool is_hidden_matrix(const std::string& name, const at::Tensor& value) {
 }
 
 /// About U Vᵀ of the singular value decomposition U S Vᵀ of `matrix` [R,C], by five Newton-Schulz iterations
-/// in bf16 [Jordan2024].
+/// [Jordan2024].
 at::Tensor orthogonalised(const at::Tensor& matrix) {
   const bool tall = matrix.size(0) > matrix.size(1);
-  at::Tensor x = (tall ? matrix.t() : matrix).to(at::kBFloat16).contiguous();
+  at::Tensor x = (tall ? matrix.t() : matrix).to(training_type(matrix.device())).contiguous();
   x = x / (x.norm() + 1e-7);
   for (int i = 0; i < 5; ++i) {
     const at::Tensor square = at::mm(x, x.t());
@@ -253,6 +254,10 @@ int64_t Parameters::num_parameters() const {
   int64_t count = 0;
   for (const Entry& entry : entries_) count += entry.value.numel();
   return count;
+}
+
+at::ScalarType training_type(c10::Device device) {
+  return device.is_cuda() || multiplies_bf16() ? at::kBFloat16 : at::kFloat;
 }
 
 }  // namespace patina::train_mini

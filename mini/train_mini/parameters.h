@@ -74,4 +74,8 @@ class Parameters final : public nn::WeightSource {
   std::map<std::string, size_t> index_;
 };
 
+/// The type that trainings compute in: bf16 on a GPU and where the processor multiplies it, else f32. Weights
+/// stay f32.
+at::ScalarType training_type(c10::Device device);
+
 }  // namespace patina::train_mini

@@ -134,7 +134,7 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
     const int64_t scale = config.latent_scale();
     const at::Tensor noise =
         at::randn({x.size(0), config.latent_channels, x.size(2) / scale, x.size(3) / scale}, x.options());
-    const Vae vae = vae_of(parameters, config, at::kBFloat16);
+    const Vae vae = vae_of(parameters, config, training_type(options.device));
     std::mutex mutex;
     std::map<std::string, double> means;
     in_shares(options.run.workers, x.size(0), [&](int64_t begin, int64_t end) {
@@ -174,7 +174,7 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
 
 void encode_latents(const fs::path& work, const fs::path& model, c10::Device device) {
   const c10::InferenceMode inference;
-  const Vae vae(model / "vae", at::kBFloat16);
+  const Vae vae(model / "vae", training_type(device));
   double sum_of_squares = 0, count = 0;
   for (const char* part : {"training", "held_out"}) {
     const SampleFolder samples(work / part);

@@ -17,4 +17,10 @@ inline uint16_t bf16_of_float(float value) {
   return static_cast<uint16_t>((bits + 0x7fffu + ((bits >> 16) & 1u)) >> 16);
 }
 
+/// Whether this processor multiplies bf16 in one instruction. Where it does not, libraries emulate bf16, many
+/// times slower than f32.
+inline bool multiplies_bf16() {
+  return __builtin_cpu_supports("avx512bf16");
+}
+
 }  // namespace patina

@@ -5,6 +5,7 @@
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 
+#include "patina/base/bf16.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/unet_blocks.h"
@@ -31,7 +32,7 @@ Dtype resolve(Dtype wanted, Device device, const TensorTable& unet) {
   if (device == Device::kCuda) return Dtype::kBf16;
   int64_t parameters = 0;
   for (const auto& [name, tensor] : unet.tensors) parameters += tensor.entry.num_elements();
-  return __builtin_cpu_supports("avx512bf16") && parameters >= kLargeNetwork ? Dtype::kBf16 : Dtype::kF32;
+  return multiplies_bf16() && parameters >= kLargeNetwork ? Dtype::kBf16 : Dtype::kF32;
 }
 
 at::ScalarType scalar_type(Dtype dtype) {
