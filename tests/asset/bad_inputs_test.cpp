@@ -74,11 +74,11 @@ bool is_plain_text(const std::string& text) {
   return true;
 }
 
-TEST(BadInputs, each_gets_an_answer_or_a_clear_refusal) {
-  PATINA_REQUIRE_SHARED("bad-inputs/MANIFEST.tsv");
+// Each case of a collection gets an answer or a clear refusal.
+void expect_judged(const fs::path& folder, size_t min_cases) {
   const patina::test::TemporaryFolder scratch;
-  const std::vector<Case> cases = manifest(patina::test::shared_dir() / "bad-inputs");
-  ASSERT_GT(cases.size(), 500u);
+  const std::vector<Case> cases = manifest(folder);
+  ASSERT_GE(cases.size(), min_cases);
   auto second_half = std::async(std::launch::async, [&] { return probed(cases, 1, scratch.path()); });
   std::map<std::string, Result> results = probed(cases, 0, scratch.path());
   results.merge(second_half.get());
@@ -104,6 +104,15 @@ TEST(BadInputs, each_gets_an_answer_or_a_clear_refusal) {
     EXPECT_TRUE(is_plain_text(r.message)) << "the message holds control characters or several lines";
     EXPECT_GT(r.message.size(), c.path.size() + 10) << "the message does not name the fault";
   }
+}
+
+TEST(BadInputs, those_of_the_repository_get_an_answer_or_a_clear_refusal) {
+  expect_judged(patina::test::data_dir() / "bad-inputs", 25);
+}
+
+TEST(BadInputs, those_of_the_shared_folder_get_an_answer_or_a_clear_refusal) {
+  PATINA_REQUIRE_SHARED("bad-inputs/MANIFEST.tsv");
+  expect_judged(patina::test::shared_dir() / "bad-inputs", 500);
 }
 
 }  // namespace
