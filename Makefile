@@ -1,4 +1,5 @@
 # The commands of the README. Each installs what it needs (Debian packages, once), configures and builds by itself.
+#   make help    this list
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
@@ -6,6 +7,9 @@
 #   make gallery      the pictures of docs/gallery.md
 #   make train-mini   the programs that make patina-mini: make_dataset and train_mini (mini/docs/training.md)
 #   make bench-mini   how good the small model is: build/bench/mini.json and pictures (mini/docs/measuring-mini.md)
+#   make format       clang-format on every source file
+#   make tidy         clang-tidy on the sources that differ from main
+#   make clean        removes build/
 
 JOBS ?= $(shell nproc)
 # Without it ccache does not keep what was compiled with a precompiled header.
@@ -23,7 +27,10 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: build check demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build check demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+
+help:
+	@sed -n 's/^#   //p' Makefile
 
 setup:
 	@scripts/setup.sh
@@ -106,10 +113,10 @@ bench-mini: setup
 	  --demo 'rm -rf build/bench/mini/demo && mkdir -p build/bench/mini/demo && $(call demo_command,build/bench/mini/demo)'
 
 format:
-	git ls-files '*.cpp' '*.h' | xargs clang-format -i
+	git ls-files '*.cpp' '*.h' '*.inl' '*.cu' '*.cuh' | xargs clang-format -i
 
 tidy:
-	git ls-files 'src/*.cpp' 'apps/*.cpp' | xargs -P $(JOBS) -n 1 clang-tidy -p build/release --quiet
+	@scripts/check_tidy.sh
 
 clean:
 	rm -rf build

@@ -1,29 +1,26 @@
 #!/usr/bin/env bash
-# Runs every test program of a build folder and ends with one line: N passed, N failed, N skipped.
-#   scripts/run_tests.sh build/release
+# Runs test programs of a build folder and ends with one line: N passed, N failed, N skipped.
+#   scripts/run_tests.sh build/release                 # all
+#   scripts/run_tests.sh build/asan-ubsan base asset   # some
 set -u
-build="${1:?usage: scripts/run_tests.sh BUILD_DIR}"
+build="${1:?usage: scripts/run_tests.sh BUILD_DIR [SUITE ...]}"
+shift
 cd "$(dirname "$0")/.."
 
 export OMP_WAIT_POLICY=passive   # OpenMP's waiting threads sleep; spinning ones starve the tests beside them
 passed=0 failed=0 skipped=0
-shopt -s nullglob
-programs=("$build"/test_*)
-if ((${#programs[@]} == 0)); then
-  echo "no test programs in $build; build them first (make check)" >&2
-  exit 1
-fi
-for program in "${programs[@]}"; do
-  [[ -x "$program" && ! -d "$program" ]] || continue
-  name="$(basename "$program")"
+suites=("$@")
+if ((${#suites[@]} == 0)); then mapfile -t suites < "$build/tests.txt"; fi
+for suite in "${suites[@]}"; do
+  name="test_$suite"
   log="$build/$name.log"
   start=$SECONDS
-  "$program" --gtest_color=no >"$log" 2>&1
+  "$build/$name" --gtest_color=no >"$log" 2>&1
   status=$?
   p=$(grep -c '^\[       OK \]' "$log")
   f=$(grep -c '^\[  FAILED  \].* ms)$' "$log")
   s=$(grep -c '^\[  SKIPPED \].* ms)$' "$log")
-  # A program that crashed before it could count its failure is a failure too.
+  # A program that is missing, or crashed before it could count its failure, is a failure too.
   if ((status != 0 && f == 0)); then f=1; fi
   passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
   printf '%-20s %4d passed %3d failed %3d skipped  %4d s\n' "$name" "$p" "$f" "$s" $((SECONDS - start))

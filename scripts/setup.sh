@@ -2,6 +2,7 @@
 # Installs everything patina builds and runs with, from Debian 12's own packages. Safe to run again: it
 # asks dpkg first and touches the network only when something is missing.
 #   scripts/setup.sh            what `make build`, `make demo` and `make check` need
+#   scripts/setup.sh --ci       what .ci/run needs as well (clang-format, clang-tidy)
 #   scripts/setup.sh --bench    the peers of the benchmarks as well (Blender)
 set -euo pipefail
 
@@ -14,6 +15,7 @@ packages=(
   nlohmann-json3-dev libglm-dev libcli11-dev libfmt-dev libxxhash-dev
   libgtest-dev libbenchmark-dev
 )
+if [[ "${1:-}" == "--ci" ]]; then packages+=(clang-format clang-tidy); fi
 if [[ "${1:-}" == "--bench" ]]; then packages+=(blender python3-numpy); fi
 
 missing=()
