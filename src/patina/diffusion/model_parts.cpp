@@ -19,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-
 /// What the model folders hold, looked up when first needed.
 class Folders {
  public:

@@ -31,8 +31,8 @@ vec3 trace_path_from(const Scene& scene, const Ray& ray, const Hit& first, const
 /// Both with other maps of the asset than the scene's own (Scene::surface).
 vec3 trace_path(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, const Ray& ray,
                 const PathOptions& options, RandomStream& random);
-vec3 trace_path_from(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, const Ray& ray, const Hit& first,
-                     const PathOptions& options, RandomStream& random);
+vec3 trace_path_from(const Scene& scene, std::span<const asset::MaterialMaps> asset_materials, const Ray& ray,
+                     const Hit& first, const PathOptions& options, RandomStream& random);
 
 struct Render {
   Image radiance;  // [H,W,3] linear HDR, premultiplied by coverage when the environment is not shown
