@@ -28,6 +28,7 @@ const std::map<std::string, Folders> kStandsOn{
     {"attention", {"base"}},
     {"correspond", {"views", "attention"}},
     {"nn", {"attention"}},
+    {"prior", {"nn", "image"}},
     {"diffusion", {"nn", "image"}},
     {"inverse", {"views"}},
     {"report", {"inverse", "correspond"}},
@@ -63,9 +64,9 @@ struct Restricted {
   Folders folders;
 };
 const std::vector<Restricted> kRestricted{
-    {"torch/", {"nn", "diffusion"}},
-    {"ATen/", {"nn", "diffusion"}},
-    {"c10/", {"nn", "diffusion"}},
+    {"torch/", {"nn", "prior", "diffusion"}},
+    {"ATen/", {"nn", "prior", "diffusion"}},
+    {"c10/", {"nn", "prior", "diffusion"}},
     {"embree3/", {"render"}},
     {"OpenImageIO/", {"image"}},
     {"webp/", {"report"}},
