@@ -17,8 +17,8 @@ using namespace patina;
 namespace fs = std::filesystem;
 
 constexpr const char* kUsage =
-    "usage: make_dataset objects --shared SHARED --count N WORK      bake N objects of four views "
-    "(resumable)\n"
+    "usage: make_dataset objects --shared SHARED --count N [--quick] WORK  bake N objects of four "
+    "views (resumable); quick: a quarter of the rays\n"
     "       make_dataset materials --shared SHARED [--limit N] WORK  pack photographed materials\n"
     "       make_dataset pack WORK SHARDS                            gather both into a few shards\n"
     "       make_dataset preview SHARDS -o SHEET.png [--seed N] [--rows N] [--width N]\n"
@@ -31,7 +31,7 @@ struct Arguments {
   std::string only;
   int count = 80, limit = 16, rows = 8, width = 160;
   int64_t seed = 0;
-  bool held_out = false, good = true;
+  bool quick = false, held_out = false, good = true;
 };
 
 Arguments parsed(int argc, char** argv) {
@@ -54,6 +54,8 @@ Arguments parsed(int argc, char** argv) {
       out.output = value();
     else if (word == "--only")
       out.only = value();
+    else if (word == "--quick")
+      out.quick = true;
     else if (word == "--held-out")
       out.held_out = true;
     else if (word == "--count")
@@ -83,7 +85,7 @@ int main(int argc, char** argv) {
     const Arguments a = parsed(argc, argv);
     const auto has = [&](size_t n) { return a.good && a.positional.size() == n; };
     if (command == "objects" && has(1)) {
-      bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects",
+      bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects", a.quick,
                    tools::console_progress());
     } else if (command == "materials" && has(1) && !a.shared.empty()) {
       const auto entries = material_entries(a.shared / "materials", a.limit, tools::console_progress());

@@ -77,7 +77,7 @@ std::vector<ObjectPlan> object_plans(int count) {
 }
 
 void bake_objects(const std::vector<ObjectPlan>& plans, const fs::path& shared, const fs::path& folder,
-                  const Progress& progress) {
+                  bool quick, const Progress& progress) {
   const auto total = static_cast<double>(plans.size());
   for (size_t i = 0; i < plans.size(); ++i) {
     const ObjectPlan& plan = plans[i];
@@ -104,6 +104,7 @@ void bake_objects(const std::vector<ObjectPlan>& plans, const fs::path& shared, 
     Draw draw(plan.seed, mini_data::kDrawView);
     BakeOptions options;
     options.seed = plan.seed << 8;
+    if (quick) options.diffuse_strata /= 2, options.gloss_strata /= 2;
     // The product's own elevation and field of view are the most usual, others are not rare.
     options.elevation = glm::radians(draw.chance(0.3f) ? 20.0f : draw(-10, 50));
     options.azimuth_start = draw(0, 2 * kPi);

@@ -39,6 +39,11 @@ Tensor displayed(const Tensor& radiance, const Tensor& coverage, const Tensor& s
   return srgb_from_linear(coverage * (light / (1 + light)) + (1 - coverage) * kBackdrop);
 }
 
+MaterialMaps maps_of(const Fields& fields, const SurfaceValues& surface) {
+  return {surface.albedo, surface.roughness, surface.metallic,
+          fields.to_camera(bumped_normal(fields, surface))};
+}
+
 }  // namespace
 
 Batch compose(const Library& library, std::span<const Plan> plans, int side) {
@@ -71,8 +76,10 @@ Batch compose(const Library& library, std::span<const Plan> plans, int side) {
   out.coverage = fields.coverage;
   out.tile = displayed(clean_light, fields.coverage, scale);
   out.target = displayed(aged_light, fields.coverage, scale);
+  out.clean = maps_of(fields, clean);
+  out.aged = maps_of(fields, aged.surface);
   // Blue is front, red is left, green is top; black where a pixel's centre meets nothing.
-  const Tensor n = fields.to_camera(bumped_normal(fields, clean));
+  const Tensor& n = out.clean.normal;
   const Tensor flipped = n * at::tensor({-1.0f, 1.0f, 1.0f}, n.options()).view({1, 3, 1, 1});
   out.normal = (0.5 + 0.5 * flipped).clamp(0, 1) * (fields.coverage > 0.5).to(at::kFloat);
   out.age_mask = aged.mask;

@@ -18,6 +18,15 @@ namespace patina::mini_data {
 struct Library;
 std::shared_ptr<const Library> make_library(const Dataset& dataset, c10::Device device);
 
+/// What a picture shows, pixel by pixel: f32 on the library's device. Outside the object the values go on
+/// smoothly.
+struct MaterialMaps {
+  at::Tensor base_color;  // [B,3,H,W] linear Rec. 709
+  at::Tensor roughness;   // [B,1,H,W] perceptual
+  at::Tensor metallic;    // [B,1,H,W]
+  at::Tensor normal;  // [B,3,H,W] unit, with the materials' relief; camera's frame, z points to the camera
+};
+
 /// B = number of plans × views a plan; samples of one plan follow each other. f32 on the library's device.
 struct Batch {
   at::Tensor
@@ -26,6 +35,7 @@ struct Batch {
   at::Tensor target;                  // [B,3,H,W] sRGB [0,1]: the aged render, same light and exposure
   at::Tensor coverage;                // [B,1,H,W]
   at::Tensor age_mask;                // [B,1,H,W] how much of the surface's colour the layers made up, [0,1]
+  MaterialMaps clean, aged;           // what tile and target were lit from
   std::vector<std::string> captions;  // [B]
   std::vector<float> exposure_ev;     // [plans], in units of the object's mean light
 };

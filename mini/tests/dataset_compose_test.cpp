@@ -8,6 +8,8 @@
 #include "make_dataset/bake.h"
 #include "make_dataset/shapes.h"
 #include "mini_data/compose.h"
+#include "mini_data/fields.h"
+#include "mini_data/shading.h"
 #include "patina/asset/material_maps.h"
 #include "patina/image/color.h"
 #include "patina/render/path_tracer.h"
@@ -98,6 +100,63 @@ TEST(Compose, light_matches_the_path_tracer) {
     std::printf("%s: %.1f dB on the object\n", material.name, static_cast<double>(psnr));
     EXPECT_GE(psnr, 28.0f) << material.name;
   }
+}
+
+// Maps and light put together again outside of compose().
+at::Tensor relit(const MaterialMaps& maps, const Plan& plan, float exposure_ev) {
+  const std::vector<const Plan*> samples{&plan};
+  const Fields fields = read_fields(kettle_library(), samples, {plan.views[0]}, 1);
+  const at::Tensor world = rotated(fields.rotation, maps.normal.contiguous());
+  const SurfaceValues surface{maps.base_color, maps.roughness, maps.metallic, {}, world - fields.normal};
+  const at::Tensor light = std::exp2(exposure_ev) * shaded(kettle_library(), fields, surface, 1);
+  const float backdrop = linear_from_srgb(views::kBackdropSrgb);
+  return mini_data::srgb_from_linear(fields.coverage * (light / (1 + light)) +
+                                     (1 - fields.coverage) * backdrop);
+}
+
+TEST(Compose, maps_of_a_sample_give_its_pictures_when_lit_again) {
+  const Catalog catalog = catalog_of(kettle_data());
+  for (uint64_t index = 0; index < 8; ++index) {
+    const Plan plan = draw_plan(catalog, 31, index, {});
+    const Batch batch = compose(kettle_library(), std::span(&plan, 1));
+    const float ev = batch.exposure_ev[0];
+    EXPECT_LT((relit(batch.clean, plan, ev) - batch.tile).abs().max().item<float>(), 2e-3f) << index;
+    EXPECT_LT((relit(batch.aged, plan, ev) - batch.target).abs().max().item<float>(), 2e-3f) << index;
+  }
+}
+
+// The renderer's own buffers of the same object are the truth for the camera's frame.
+TEST(Compose, maps_of_one_plain_material_are_its_numbers_and_the_normals_of_the_renderer) {
+  Plan plan;
+  plan.views = {0};
+  plan.clean[0].color = vec3(0.6f, 0.3f, 0.1f), plan.clean[0].roughness = 0.4f, plan.clean[0].metallic = 1;
+  plan.clean[1] = plan.clean[0];
+  const Batch batch = compose(kettle_library(), std::span(&plan, 1));
+  const Finished shape = finished(make_shape(kKind, kSeed).mesh);
+  const render::Scene scene(shape.asset, asset::resolve_materials(shape.asset), render::studio_environment());
+  views::OrbitOptions orbit;
+  const BakeOptions baked = bake_options();
+  orbit.num_views = 1, orbit.resolution = kViewSide, orbit.elevations = {baked.elevation};
+  orbit.azimuth_start = baked.azimuth_start, orbit.fov_y = baked.fov_y;
+  const views::GBuffer gbuffer =
+      views::make_gbuffer(scene, views::orbit_cameras({vec3(-1), vec3(1), 1.0f}, orbit)[0]);
+  const mat3& world_from_camera = kettle_data().objects[0].views[0].world_from_camera;
+  const Image normal = image_of(batch.clean.normal[0]);
+  double cosines = 0;
+  int count = 0;
+  for (int y = 0; y < kViewSide; ++y)
+    for (int x = 0; x < kViewSide; ++x) {
+      const auto i = static_cast<size_t>(y * kViewSide + x);
+      if (gbuffer.coverage[i] < 1 || gbuffer.view_cosine[i] < 0.3f) continue;
+      cosines += glm::dot(normal.rgb(x, y), glm::transpose(world_from_camera) * gbuffer.n_shading_world[i]);
+      ++count;
+    }
+  ASSERT_GT(count, 1000);
+  EXPECT_GT(cosines / count, std::cos(glm::radians(3.0)));
+  EXPECT_LT((batch.clean.base_color.select(1, 1) - linear_from_srgb(0.3f)).abs().max().item<float>(), 1e-5f);
+  EXPECT_LT((batch.clean.roughness - 0.4f).abs().max().item<float>(), 1e-6f);
+  EXPECT_LT((batch.clean.metallic - 1).abs().max().item<float>(), 1e-6f);
+  EXPECT_TRUE(at::equal(batch.clean.normal, batch.aged.normal));
 }
 
 // Mean of the age mask over the pixels on which `holds` is true.

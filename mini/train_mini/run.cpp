@@ -9,7 +9,7 @@
 namespace patina::train_mini {
 namespace {
 
-constexpr double kWarmUpSteps = 300, kLogSeconds = 20;
+constexpr double kLogSeconds = 20;
 volatile std::sig_atomic_t stop_requested = 0;
 
 }  // namespace
@@ -30,7 +30,7 @@ bool Run::finished() const {
 }
 
 double Run::rate() const {
-  const double warm = std::min(1.0, (static_cast<double>(step_) + 1) / kWarmUpSteps);
+  const double warm = std::min(1.0, (static_cast<double>(step_) + 1) / options_.warm_up_steps);
   const double share = std::min(1.0, seconds() / (options_.minutes * 60));
   return options_.rate * warm * (options_.settle ? 0.5 + 0.5 * std::cos(M_PI * share) : 1.0);
 }

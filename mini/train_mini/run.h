@@ -12,7 +12,8 @@ namespace patina::train_mini {
 struct RunOptions {
   double minutes = 60;
   double rate = 3e-4;
-  bool settle = false;  // the rate falls to zero over the run
+  bool settle = false;         // the rate falls to zero over the run
+  double warm_up_steps = 300;  // of the training, in which the rate rises
   uint64_t seed = 0;
   int64_t workers = 1;  // threads that share a step
 };
@@ -25,7 +26,7 @@ class Run {
   int64_t step() const { return step_; }
   void next() { ++step_; }
   bool finished() const;
-  /// Warms up over the first 300 steps of the training, falls at the end of a run that settles.
+  /// Warms up over the first steps of the training, falls at the end of a run that settles.
   double rate() const;
   /// True every `seconds`, for checkpoints.
   bool due(double seconds);
