@@ -3,6 +3,7 @@
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
+#   make sanitise     the suites that finish in minutes, under the address and undefined-behaviour sanitisers
 #   make bench-noise, bench-attention, bench-inverse, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
 #   make gallery      the pictures of docs/gallery.md
 #   make train-mini   the programs that make patina-mini: make_dataset and train_mini (mini/docs/training.md)
@@ -27,7 +28,7 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: help build check demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build check sanitise demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -43,6 +44,12 @@ check: setup
 	@cmake --preset release -DPATINA_BUILD_TESTS=ON -DPATINA_BUILD_BENCH=OFF -DPATINA_BUILD_MINI=$(MINI)
 	@cmake --build build/release --parallel $(JOBS)
 	@scripts/run_tests.sh build/release
+
+SANITISED := base image asset views correspond attention
+sanitise: setup
+	@cmake --preset asan-ubsan -DPATINA_PCH=OFF
+	@cmake --build build/asan-ubsan --parallel $(JOBS) --target $(addprefix test_,$(SANITISED))
+	@scripts/run_tests.sh build/asan-ubsan $(SANITISED)
 
 demo: build
 	@mkdir -p $(DEMO_DIR)

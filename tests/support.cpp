@@ -11,7 +11,7 @@ namespace {
 namespace fs = std::filesystem;
 
 fs::path source_root() {
-  return fs::path(__FILE__).parent_path().parent_path();
+  return PATINA_SOURCE_DIR;
 }
 
 }  // namespace

@@ -146,7 +146,7 @@ void run(const Arguments& arguments) {
   });
   if (std::optional<json> trials = kept_result(folder, kClassifierTrials, materials_key))
     parts["classifier"] = *std::move(trials);
-  model.unmodel.loaded();  // the priors' runs load it themselves
+  model.unload();  // the priors' runs load it themselves
   // The sweep first: the pages of both lie in one folder, and the one with textures shall stay.
   add("sweep", priors_key + json(arguments.weights).dump(),
       [&] { return measure_sweep(assets, for_priors, arguments.weights, folder / "priors"); });

@@ -90,7 +90,7 @@ TEST(Parameters, gradients_of_a_network_are_the_slopes_of_its_loss) {
   const auto loss = [&] {
     nn::WeightReader weights(parameters, at::kFloat);
     const diffusion::UNet unet(config, weights);
-    return (unet({sample, at::tensor({10.0f, 700.0f}), text}) - target).to(at::kDouble).square().mean();
+    return (unet({sample, at::tensor({10.0f, 700.0f}), {text, {}}}) - target).to(at::kDouble).square().mean();
   };
   loss().backward();
   for (const char* name :

@@ -31,7 +31,7 @@ Tensor cosine_transform() {
   return out;
 }
 
-Tensor uniform(const Tensor& like, double low, double high) {
+Tensor drawn(const Tensor& like, double low, double high) {
   return low + (high - low) * at::rand({like.size(0), 1, 1, 1}, like.options());
 }
 // 1 for about this share of the samples.
@@ -156,19 +156,19 @@ Tensor reexposed(const Tensor& picture, const Tensor& coverage, const Tensor& ev
 
 Tensor disturbed(const Tensor& planes) {
   const Tensor coverage = planes.slice(1, kCoverage, kCoverage + 1);
-  const Tensor ev = uniform(planes, -0.7, 0.7) * share(planes, 0.7);
+  const Tensor ev = drawn(planes, -0.7, 0.7) * share(planes, 0.7);
   Tensor out = planes.clone();
   const auto picture = [&](int64_t first) { return out.slice(1, first, first + 3); };
   picture(kRender).copy_(reexposed(picture(kRender), coverage, ev));
   Tensor edited = reexposed(picture(kEdited), coverage, ev);
   const Tensor any = share(planes, 5.0 / 6);
-  edited = drifted(edited, any * share(planes, 0.6) * uniform(planes, 0, 1.5));
+  edited = drifted(edited, any * share(planes, 0.6) * drawn(planes, 0, 1.5));
   edited = shifted(edited, any * share(planes, 0.3));
-  edited = blurred(edited, any * share(planes, 0.5) * uniform(planes, 0.2, 1.3));
-  edited = noisy(edited, any * share(planes, 0.5) * uniform(planes, 0, 0.03),
-                 any * share(planes, 0.5) * uniform(planes, 0, 0.03));
+  edited = blurred(edited, any * share(planes, 0.5) * drawn(planes, 0.2, 1.3));
+  edited = noisy(edited, any * share(planes, 0.5) * drawn(planes, 0, 0.03),
+                 any * share(planes, 0.5) * drawn(planes, 0, 0.03));
   const Tensor packed = any * share(planes, 0.4);
-  edited = at::where(packed > 0, compressed(edited.clamp(0, 1), packed * uniform(planes, 0.1, 1.0)), edited);
+  edited = at::where(packed > 0, compressed(edited.clamp(0, 1), packed * drawn(planes, 0.1, 1.0)), edited);
   picture(kEdited).copy_(edited.clamp(0, 1));
   return out;
 }

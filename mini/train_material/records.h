@@ -50,8 +50,9 @@ struct RecordOptions {
   mini_data::Part part = mini_data::Part::kTraining;
   int64_t count = 1000;
   uint64_t seed = 0;
-  std::filesystem::path
-      autoencoder;  // folder of a VAE through which every third edited picture goes; empty: none
+  /// What an autoencoder makes of pictures [B,3,256,256] in [0,1]; every third edited picture goes through
+  /// it. Empty: none.
+  std::function<at::Tensor(const at::Tensor&)> through_autoencoder;
 };
 
 /// Appends to FOLDER until it holds `count` samples; what an earlier, killed call left is kept.

@@ -12,6 +12,7 @@
 #include "evaluation.h"
 #include "loss.h"
 #include "patina/base/files.h"
+#include "patina/nn/file_weights.h"
 #include "records.h"
 #include "train_mini/parameters.h"
 #include "train_mini/workers.h"

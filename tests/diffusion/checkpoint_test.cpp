@@ -235,7 +235,7 @@ TEST_F(BrokenCheckpoint, infinities_are_named) {
   const std::vector<nn::TensorEntry> tensors{
       {"<word>", ElementType::kF32, {1, 4}, {reinterpret_cast<const uint8_t*>(values.data()), 16}}};
   nn::write_safetensors(path_, tensors);
-  expect_in("hold infinities or what is no number: <word> (2 of 4)", check());
+  expect_in("hold infinities or NaN: <word> (2 of 4)", check());
 }
 
 TEST_F(BrokenCheckpoint, other_families_are_refused_by_name) {

@@ -8,6 +8,7 @@
 
 #include "../support.h"
 #include "patina/base/error.h"
+#include "patina/nn/file_weights.h"
 
 namespace patina::nn {
 namespace {
@@ -15,26 +16,6 @@ namespace {
 std::span<const uint8_t> bytes_of_vector(const auto& values) {
   return {reinterpret_cast<const uint8_t*>(values.data()), values.size() * sizeof(values[0])};
 }
-
-// A weight file whose tensors bear the names that the network asks for.
-class FileWeights final : public WeightSource {
- public:
-  explicit FileWeights(const SafeTensors& file) : file_(file) {}
-  std::string where() const override { return file_.path().string(); }
-  bool has(const std::string& name) const override { return file_.find(name) != nullptr; }
-  at::Tensor find(const std::string& name, at::IntArrayRef, at::ScalarType type) override {
-    const TensorEntry* entry = file_.find(name);
-    return entry ? read_tensor(file_, *entry, type) : at::Tensor();
-  }
-  std::vector<std::string> names() const override {
-    std::vector<std::string> names;
-    for (const TensorEntry& entry : file_.tensors()) names.push_back(entry.name);
-    return names;
-  }
-
- private:
-  const SafeTensors& file_;
-};
 
 class Weights : public testing::Test {
  protected:

@@ -7,6 +7,7 @@
 
 #include "patina/base/check.h"
 #include "patina/image/color.h"
+#include "patina/nn/file_weights.h"
 #include "patina/prior/material_network.h"
 
 namespace patina::prior {
