@@ -130,7 +130,8 @@ TEST(MetricsTable, facts_have_names_and_meanings_but_no_verdict) {
   EXPECT_TRUE(contains(html, "class=\"text\" colspan=\"2\">SD 1.5 architecture"))
       << "text lies in a cell that wraps";
   EXPECT_FALSE(contains(html, "Guided away from")) << "of nothing";
-  EXPECT_FALSE(contains(html, "exposure_ev") || contains(html, "psnr_before") || contains(html, "guidance.scale"));
+  EXPECT_FALSE(contains(html, "exposure_ev") || contains(html, "psnr_before") ||
+               contains(html, "guidance.scale"));
   EXPECT_EQ(count(html, "<small>good"), 0u);
 }
 
