@@ -8,10 +8,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../support.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/nn/safetensors.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {

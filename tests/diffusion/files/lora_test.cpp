@@ -4,11 +4,11 @@
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 
-#include "../support.h"
 #include "make_checkpoint/checkpoint.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/files/embedding.h"
 #include "patina/diffusion/networks/component.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {

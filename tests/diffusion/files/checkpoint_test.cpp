@@ -2,12 +2,12 @@
 // refused by file and tensor.
 #include "make_checkpoint/checkpoint.h"
 
+#include "../refusals.h"
+#include "../small_runs.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/check_model.h"
 #include "patina/diffusion/files/weight_files.h"
-#include "refusals.h"
-#include "small_runs.h"
 
 namespace patina::diffusion {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <set>
 
-#include "../support.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {

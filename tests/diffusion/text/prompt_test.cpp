@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "../support.h"
 #include "patina/base/error.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {

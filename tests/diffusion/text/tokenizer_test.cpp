@@ -1,10 +1,10 @@
 // The tokenizer beyond the golden prompts: hostile text, the vocabulary's own faults, and Unicode.
 #include "patina/diffusion/text/tokenizer.h"
 
-#include "../support.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/text/unicode.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {

@@ -6,7 +6,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../support.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/check_model.h"
@@ -14,6 +13,7 @@
 #include "patina/diffusion/files/infer_config.h"
 #include "patina/diffusion/files/network_part.h"
 #include "patina/diffusion/files/recognise.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {

@@ -7,10 +7,10 @@
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 
-#include "../support.h"
 #include "make_checkpoint/configs.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/prediction.h"
+#include "support.h"
 
 namespace patina::diffusion {
 namespace {
