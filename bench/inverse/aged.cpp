@@ -215,7 +215,7 @@ Aged age_and_fit(const Ageing& ageing, const AgedOptions& options) {
 
   const auto begin = std::chrono::steady_clock::now();
   const render::Scene start(aged.asset, aged.start, render::studio_environment());
-  aged.fit = inverse::fit_materials(start, aged.views, aged.targets, options.fit, {}, {});
+  aged.fit = inverse::fit_materials(start, {aged.views, aged.targets}, options.fit, {}, {});
   aged.fit_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return aged;
 }

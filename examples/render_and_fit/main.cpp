@@ -41,7 +41,7 @@ void render_and_fit(const char* from, const char* to) {
   inverse::FitOptions options;
   options.iterations = 40;
   const inverse::FitResult fitted =
-      inverse::fit_materials(scene, set, edited, options, /*hooks=*/{}, progress);
+      inverse::fit_materials(scene, {set, edited}, options, /*hooks=*/{}, progress);
   std::fprintf(stderr, "\n");
   std::printf("the new textures reproduce the edited pictures to %.1f dB\n", fitted.psnr);
   asset::export_asset(asset, fitted.maps, fitted.changed, to);

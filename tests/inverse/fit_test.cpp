@@ -91,7 +91,7 @@ Found find_textures(Task& task) {
   const auto start = task.world.scene.materials();
   inverse::FitOptions options = quick();
   options.iterations = kEnoughIterations;
-  auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, {}, {});
   const double before = base_color_error(start, task, result),
                after = base_color_error(result.maps, task, result);
   return {std::move(result), before, after};
@@ -139,13 +139,13 @@ TEST(fit, continues_from_a_checkpoint_made_before_the_first_iteration) {
   Task whole = make_task();
   const inverse::FitOptions options = quick();
   const auto expected =
-      all_texels(inverse::fit_materials(whole.world.scene, whole.views, whole.edited, options, {}, {}));
+      all_texels(inverse::fit_materials(whole.world.scene, {whole.views, whole.edited}, options, {}, {}));
   Task task = make_task();
   const Progress progress;
-  inverse::Fit fit(task.world.scene, task.views, task.edited, options, progress);
+  inverse::Fit fit(task.world.scene, {task.views, task.edited}, options, progress);
   inverse::FitHooks hooks;
   hooks.resume = fit.checkpoint();
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, hooks, {});
+  const auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, hooks, {});
   EXPECT_TRUE(all_texels(result) == expected);
 }
 
@@ -155,7 +155,7 @@ TEST(fit, is_the_same_for_any_number_of_threads) {
     set_num_threads(threads);
     Task task = make_task();
     results.push_back(
-        all_texels(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {})));
+        all_texels(inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), {}, {})));
   }
   set_num_threads(0);
   EXPECT_TRUE(results[0] == results[1]);
@@ -164,7 +164,7 @@ TEST(fit, is_the_same_for_any_number_of_threads) {
 TEST(fit, resumed_run_gives_the_same_bytes) {
   Task whole = make_task();
   const auto expected =
-      all_texels(inverse::fit_materials(whole.world.scene, whole.views, whole.edited, quick(), {}, {}));
+      all_texels(inverse::fit_materials(whole.world.scene, {whole.views, whole.edited}, quick(), {}, {}));
 
   // Killed in the middle of a light cache's life, with the checkpoint of that iteration at hand.
   for (const int stop_at : {7, 12}) {
@@ -177,15 +177,15 @@ TEST(fit, resumed_run_gives_the_same_bytes) {
     };
     Progress progress;
     progress.stop_requested = [&] { return saved.has_value(); };
-    EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, progress),
-                 Error);
+    EXPECT_THROW(
+        inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), hooks, progress), Error);
     ASSERT_TRUE(saved.has_value());
 
     Task again = make_task();
     hooks = {};
     hooks.resume = saved;
     const auto result =
-        inverse::fit_materials(again.world.scene, again.views, again.edited, quick(), hooks, {});
+        inverse::fit_materials(again.world.scene, {again.views, again.edited}, quick(), hooks, {});
     EXPECT_TRUE(all_texels(result) == expected) << "stopped at " << stop_at;
   }
 }
@@ -193,13 +193,13 @@ TEST(fit, resumed_run_gives_the_same_bytes) {
 TEST(fit, stopped_at_any_moment_hands_over_its_textures_and_continues_bit_for_bit) {
   Task whole = make_task();
   const auto expected =
-      all_texels(inverse::fit_materials(whole.world.scene, whole.views, whole.edited, quick(), {}, {}));
+      all_texels(inverse::fit_materials(whole.world.scene, {whole.views, whole.edited}, quick(), {}, {}));
   // Most of the questions are asked while rays are cast.
   std::atomic<int> num_asked = 0;
   Progress counting;
   counting.stop_requested = [&] { return ++num_asked < 0; };
   Task counted = make_task();
-  inverse::fit_materials(counted.world.scene, counted.views, counted.edited, quick(), {}, counting);
+  inverse::fit_materials(counted.world.scene, {counted.views, counted.edited}, quick(), {}, counting);
   const int all = num_asked;
   for (const double share : {0.3, 0.5, 0.8}) {
     Task task = make_task();
@@ -211,8 +211,8 @@ TEST(fit, stopped_at_any_moment_hands_over_its_textures_and_continues_bit_for_bi
     num_asked = 0;
     Progress progress;
     progress.stop_requested = [&] { return ++num_asked > share * all; };
-    EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, progress),
-                 Error);
+    EXPECT_THROW(
+        inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), hooks, progress), Error);
     ASSERT_TRUE(saved.has_value() && left.has_value());
     EXPECT_GT(saved->next_iteration, 0);
     EXPECT_LT(saved->next_iteration, quick().iterations);
@@ -223,7 +223,7 @@ TEST(fit, stopped_at_any_moment_hands_over_its_textures_and_continues_bit_for_bi
     hooks = {};
     hooks.resume = saved;
     const auto result =
-        inverse::fit_materials(again.world.scene, again.views, again.edited, quick(), hooks, {});
+        inverse::fit_materials(again.world.scene, {again.views, again.edited}, quick(), hooks, {});
     EXPECT_TRUE(all_texels(result) == expected) << "stopped at " << saved->next_iteration;
   }
 }
@@ -237,7 +237,7 @@ TEST(fit, shows_every_view_and_the_loss_at_the_end) {
     num_losses = preview.loss.size();
     rendered.assign(preview.rendered.begin(), preview.rendered.end());
   };
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, {});
+  const auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), hooks, {});
   EXPECT_EQ(num_losses, result.loss.size());
   ASSERT_EQ(rendered.size(), task.edited.size());
   // What is shown comes near to what was asked for, where anything is shown.
@@ -258,16 +258,17 @@ TEST(fit, refuses_a_checkpoint_of_other_textures) {
   Task task = make_task();
   inverse::FitHooks hooks;
   hooks.resume = inverse::FitCheckpoint{3, std::vector<uint8_t>(100)};
-  EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), hooks, {}), Error);
+  EXPECT_THROW(inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), hooks, {}),
+               Error);
 }
 
 TEST(fit, changes_only_the_chosen_materials_and_maps) {
   Task task = make_task();
   const auto start = task.world.scene.materials();
   inverse::FitOptions options = quick();
-  options.materials = {true, false};
   options.maps.set(index_of(asset::MapSlot::kNormal), false);
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  const auto result =
+      inverse::fit_materials(task.world.scene, {task.views, task.edited, {true, false}}, options, {}, {});
   EXPECT_NE(result.maps[0].base_color.texels.pixels, start[0].base_color.texels.pixels);
   EXPECT_EQ(result.maps[0].normal.texels.pixels, start[0].normal.texels.pixels);
   EXPECT_EQ(result.maps[1].base_color.texels.pixels, start[1].base_color.texels.pixels);
@@ -283,7 +284,7 @@ TEST(fit, leaves_surface_that_no_view_saw_as_it_was) {
   inverse::FitOptions options = quick();
   options.texture_size = 32;
   options.fill_unseen = false;
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  const auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, {}, {});
   const asset::Map before = asset::resized(start[0].base_color, 32, 32);
   // The floor's u runs from left to right: its left third is hidden, with a margin for the rim of bilinear
   // look-ups.
@@ -310,7 +311,7 @@ TEST(fit, fills_surface_that_no_view_saw_with_the_change_beside_it_if_asked) {
     inverse::FitOptions options = quick();
     options.texture_size = 32;
     options.fill_unseen = fill;
-    return inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+    return inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, {}, {});
   };
   const inverse::FitResult result = fitted(true);
   const asset::MaterialMaps filled = result.maps[0], kept = fitted(false).maps[0];
@@ -379,13 +380,13 @@ TEST(unseen, gets_the_change_of_what_is_near_and_never_more) {
 
 TEST(fit, gives_slots_without_texture_one_that_the_views_resolve) {
   Task task = make_task();
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {});
+  const auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), {}, {});
   EXPECT_GE(result.maps[0].roughness.texels.width, 16);
   EXPECT_LE(result.maps[0].roughness.texels.width, 64);
   inverse::FitOptions options = quick();
   options.texture_size = 48;
   Task sized = make_task();
-  const auto exact = inverse::fit_materials(sized.world.scene, sized.views, sized.edited, options, {}, {});
+  const auto exact = inverse::fit_materials(sized.world.scene, {sized.views, sized.edited}, options, {}, {});
   for (const auto slot : {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal})
     EXPECT_EQ(asset::slot_map(exact.maps[0], slot).texels.width, 48);
   EXPECT_EQ(exact.maps[0].metallic.texels.width, 8);
@@ -396,7 +397,7 @@ TEST(fit, an_automatic_size_holds_what_the_views_resolve_and_never_shrinks) {
   options.texture_size = inverse::kAutoTextureSize;
   Task task = make_task();
   const int own = task.world.scene.materials()[0].base_color.texels.width;
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, options, {}, {});
+  const auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, {}, {});
   const int width = result.maps[0].base_color.texels.width;
   EXPECT_GT(width, own);
   EXPECT_LE(width, 128);  // of views of 40 pixels
@@ -411,7 +412,7 @@ TEST(fit, an_automatic_size_holds_what_the_views_resolve_and_never_shrinks) {
                                             maps.begin() + large.world.scene.num_asset_materials());
   enlarged[0].base_color = asset::resized(enlarged[0].base_color, 512, 256);
   large.world.scene.set_asset_materials(enlarged);
-  const auto kept = inverse::fit_materials(large.world.scene, large.views, large.edited, options, {}, {});
+  const auto kept = inverse::fit_materials(large.world.scene, {large.views, large.edited}, options, {}, {});
   EXPECT_EQ(kept.maps[0].base_color.texels.width, 512);
   EXPECT_EQ(kept.maps[0].base_color.texels.height, 256);
 }
@@ -420,7 +421,7 @@ TEST(fit, keeps_every_value_in_range) {
   Task task = make_task();
   for (float& value : task.edited[0].pixels)
     value = value > 0.4f ? 1.0f : 0.0f;  // no material looks like this
-  const auto result = inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {});
+  const auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), {}, {});
   for (const auto& maps : result.maps) {
     for (const float v : maps.base_color.texels.pixels) EXPECT_TRUE(v >= 0.0f && v <= 1.0f) << v;
     for (const float v : maps.roughness.texels.pixels) EXPECT_TRUE(v >= 0.03f && v <= 1.0f) << v;
@@ -436,9 +437,9 @@ TEST(fit, keeps_every_value_in_range) {
 TEST(fit, refuses_views_of_another_size) {
   Task task = make_task();
   task.edited[0] = Image(10, 10, 3);
-  EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {}), Error);
+  EXPECT_THROW(inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), {}, {}), Error);
   task.edited.clear();
-  EXPECT_THROW(inverse::fit_materials(task.world.scene, task.views, task.edited, quick(), {}, {}), Error);
+  EXPECT_THROW(inverse::fit_materials(task.world.scene, {task.views, task.edited}, quick(), {}, {}), Error);
 }
 
 TEST(loss, derivative_agrees_with_central_differences) {

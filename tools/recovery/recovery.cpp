@@ -165,7 +165,7 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
   scene.set_asset_materials(r.start);
   inverse::FitOptions fit = options.fit;
   fit.fill_unseen = false;  // what no view saw is not measured, and shows the start
-  r.fit = inverse::fit_materials(scene, r.views, r.targets, fit, {}, progress);
+  r.fit = inverse::fit_materials(scene, {r.views, r.targets}, fit, {}, progress);
   r.fit_seconds = seconds_since(begin);
   r.num_views = views_of_texels(scene, r, options.fit);
   return r;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "patina/base/check.h"
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/inverse/fit_result.h"
@@ -54,22 +55,22 @@ void run(Fit& fit, const FitHooks& hooks, const Progress& progress) {
 
 }  // namespace
 
-Fit::Fit(const render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
-         const FitOptions& options, const Progress& progress)
+Fit::Fit(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
+         const Progress& progress)
     : scene_(scene),
-      views_(views),
-      edited_(edited),
-      options_(checked(options, scene, views, edited)),
+      inputs_(checked(inputs, scene)),
+      options_(options),
       progress_(progress),
-      gain_(std::exp2(views.exposure_ev)),
+      gain_(std::exp2(inputs.views.exposure_ev)),
       schedule_(options.iterations),
-      weights_(view_weights(scene, views, options)),
-      pixels_(counted_pixels(views, edited, weights_)),
-      base_(enlarged_maps(scene, views, pixels_, options)),
-      state_(initial_state(scene, views, pixels_, base_, options)),
+      weights_(view_weights(scene, inputs, options)),
+      pixels_(counted_pixels(inputs.views, inputs.edited, weights_)),
+      base_(enlarged_maps(scene, inputs, pixels_, options)),
+      state_(initial_state(scene, inputs, pixels_, base_, options)),
       untouched_(parameters_of(state_.fitted)),
       coarse_(shrunk(base_, state_.fitted)),
       evaluator_(state_.fitted, scene.bsdf_model(), gain_) {
+  PATINA_CHECK_LE(0, options.iterations);
   if (state_.fitted.empty())
     progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
 }
@@ -86,7 +87,7 @@ void Fit::trace(LightCache& cache, int generation) {
   options.seed = options_.seed;
   options.generation = static_cast<uint32_t>(generation);
   cache.pixels = pixels_;
-  trace_cache(cache, scene_, current, base_, views_, options, progress_);
+  trace_cache(cache, scene_, current, base_, inputs_.views, options, progress_);
 }
 
 LightCache& Fit::renew(int generation) {
@@ -103,7 +104,7 @@ void Fit::start() {
 
 void Fit::resume(const FitCheckpoint& checkpoint) {
   restore_checkpoint(state_, checkpoint);
-  retarget(pixels_, edited_, state_.displacements);
+  retarget(pixels_, inputs_.edited, state_.displacements);
   if (state_.next_iteration == 0) return start();
   if (!has_work()) return;
   // Each cache was traced with the parameters of its own beginning.
@@ -124,8 +125,8 @@ void Fit::iterate() {
     state_.cache_parameters[turn] = parameters_of(state_.fitted);
   }
   if (!options_.keep_in_place && is_aligned_at(iteration, options_.iterations)) {
-    align(state_, pixels_, edited_, weights_, gain_);
-    retarget(pixels_, edited_, state_.displacements);
+    align(state_, pixels_, inputs_.edited, weights_, gain_);
+    retarget(pixels_, inputs_.edited, state_.displacements);
     for (LightCache& cache : caches_) cache.pixels = pixels_;
   }
   state_.loss.push_back(
@@ -138,7 +139,7 @@ void Fit::iterate() {
 }
 
 std::vector<Image> Fit::rendered() const {
-  return rendered_views(state_, pixels_, edited_, gain_);
+  return rendered_views(state_, pixels_, inputs_.edited, gain_);
 }
 
 void Fit::choose_best() {
@@ -167,10 +168,9 @@ FitResult Fit::take_result() {
   return result;
 }
 
-FitResult fit_materials(const render::Scene& scene, const views::ViewSet& views,
-                        std::span<const Image> edited, const FitOptions& options, const FitHooks& hooks,
-                        const Progress& progress) {
-  Fit fit(scene, views, edited, options, progress);
+FitResult fit_materials(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
+                        const FitHooks& hooks, const Progress& progress) {
+  Fit fit(scene, inputs, options, progress);
   if (hooks.resume)
     fit.resume(*hooks.resume);
   else

@@ -17,18 +17,17 @@
 
 namespace patina::inverse {
 
-/// Fits the scene's materials to `edited`, one sRGB [H,W,3] image in [0,1] a view. Calls the hooks on the
-/// way. Throws Error{kUsage} for views of other sizes, Error{kInterrupted} when progress asks to stop.
-FitResult fit_materials(const render::Scene& scene, const views::ViewSet& views,
-                        std::span<const Image> edited, const FitOptions& options, const FitHooks& hooks,
-                        const Progress& progress);
+/// Fits the scene's materials to the edited views. Calls the hooks on the way. Throws Error{kUsage} for
+/// edited views of other sizes, Error{kInterrupted} when progress asks to stop.
+FitResult fit_materials(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
+                        const FitHooks& hooks, const Progress& progress);
 
 /// The same step by step: start or resume, iterate while there is work, choose the best, take the result.
-/// Refers to all that it is given but the options.
+/// Refers to the scene, the views and the edited images.
 class Fit {
  public:
-  Fit(const render::Scene& scene, const views::ViewSet& views, std::span<const Image> edited,
-      const FitOptions& options, const Progress& progress);
+  Fit(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
+      const Progress& progress);
   Fit(const Fit&) = delete;
   Fit& operator=(const Fit&) = delete;
 
@@ -58,8 +57,7 @@ class Fit {
   LightCache& renew(int generation);
 
   const render::Scene& scene_;
-  const views::ViewSet& views_;
-  std::span<const Image> edited_;
+  const FitInputs inputs_;
   const FitOptions options_;
   const Progress& progress_;
   const float gain_;  // 2^exposure_ev

@@ -1,4 +1,4 @@
-// What a fit is asked for, what it tells on the way and what it returns.
+// What a fit is given and asked for, what it tells on the way and what it returns.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,18 @@
 #include "patina/asset/material_maps.h"
 #include "patina/image/image.h"
 
+namespace patina::views {
+struct ViewSet;
+}
+
 namespace patina::inverse {
+
+/// What a fit works on. Refers to the views and the images.
+struct FitInputs {
+  const views::ViewSet& views;    // renders of the materials as they are
+  std::span<const Image> edited;  // what the views shall look like: one sRGB [H,W,3] in [0,1] a view
+  std::vector<bool> materials{};  // which materials may change; empty: all of the asset
+};
 
 /// FitOptions::texture_size: a power of two that keeps what the views resolve, never below the asset's own.
 inline constexpr int kAutoTextureSize = -1;
@@ -20,7 +31,6 @@ struct FitOptions {
                          // for factor-only slots; kAutoTextureSize
   asset::MapSet maps = asset::set_of(
       {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal});  // that may change
-  std::vector<bool> materials;  // which materials may change; empty: all of the asset
   float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
   int light_samples = 8;        // incident directions kept a pixel
   int max_depth = 4;            // of the paths that gather incident light

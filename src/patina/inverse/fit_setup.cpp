@@ -17,8 +17,8 @@ namespace {
 // Bounds of the size that a map gets from what the views resolve.
 constexpr int kMinResolvedSize = 16, kMaxResolvedSize = 2048;
 
-bool is_chosen(const FitOptions& options, int material) {
-  return options.materials.empty() || options.materials[static_cast<size_t>(material)];
+bool is_chosen(const FitInputs& inputs, int material) {
+  return inputs.materials.empty() || inputs.materials[static_cast<size_t>(material)];
 }
 
 // The size that a map will be written with: texture_size where given; otherwise slots without a texture, and
@@ -56,19 +56,19 @@ Image changeable(const Image& evidence, const Image& covered) {
   return out;
 }
 
-std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views::ViewSet& views,
+std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const FitInputs& inputs,
                                         std::span<const CachePixel> pixels,
                                         std::span<const asset::MaterialMaps> base,
                                         const FitOptions& options) {
-  const std::vector<SeenPoint> seen = trace_seen_points(scene, views, pixels);
+  const std::vector<SeenPoint> seen = trace_seen_points(scene, inputs.views, pixels);
   std::vector<FittedMap> fitted;
   for (int m = 0; m < scene.num_asset_materials(); ++m) {
-    if (!is_chosen(options, m)) continue;
+    if (!is_chosen(inputs, m)) continue;
     for (const FitSlot& row : kFitSlots) {
       const asset::MapSlot slot = row.slot;
       if (!has(options.maps, slot)) continue;
       const asset::Map& map = slot_map(base[static_cast<size_t>(m)], slot);
-      const float across = texels_per_pixel(scene, views, pixels, map, m);
+      const float across = texels_per_pixel(scene, inputs.views, pixels, map, m);
       if (!(across > 0.0f)) continue;  // not seen, or without UVs
       // The finest level has between one and two texels a pixel, or the map's own if that is coarser.
       const int drop = std::max(0, static_cast<int>(std::floor(std::log2(across))));
@@ -89,48 +89,47 @@ std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const views:
 
 }  // namespace
 
-FitOptions checked(const FitOptions& options, const render::Scene& scene, const views::ViewSet& views,
-                   std::span<const Image> edited) {
-  if (edited.size() != views.views.size())
+FitInputs checked(const FitInputs& inputs, const render::Scene& scene) {
+  const std::vector<views::View>& views = inputs.views.views;
+  const std::span<const Image> edited = inputs.edited;
+  if (edited.size() != views.size())
     throw Error(ErrorCode::kUsage, "fit",
-                "expected one edited image for each of " + std::to_string(views.views.size()) +
-                    " views, found " + std::to_string(edited.size()));
+                "expected one edited image for each of " + std::to_string(views.size()) + " views, found " +
+                    std::to_string(edited.size()));
   for (size_t v = 0; v < edited.size(); ++v) {
-    const auto& g = views.views[v].gbuffer;
+    const auto& g = views[v].gbuffer;
     if (edited[v].width != g.width || edited[v].height != g.height || edited[v].channels != 3)
       throw Error(ErrorCode::kUsage, "edited view " + std::to_string(v),
                   "expected " + std::to_string(g.width) + " x " + std::to_string(g.height) +
                       " pixels of 3 channels, found " + std::to_string(edited[v].width) + " x " +
                       std::to_string(edited[v].height) + " of " + std::to_string(edited[v].channels));
   }
-  PATINA_CHECK(options.materials.empty() ||
-               static_cast<int>(options.materials.size()) == scene.num_asset_materials());
-  PATINA_CHECK_LE(0, options.iterations);
-  return options;
+  PATINA_CHECK(inputs.materials.empty() ||
+               static_cast<int>(inputs.materials.size()) == scene.num_asset_materials());
+  return inputs;
 }
 
-std::vector<Image> view_weights(const render::Scene& scene, const views::ViewSet& views,
+std::vector<Image> view_weights(const render::Scene& scene, const FitInputs& inputs,
                                 const FitOptions& options) {
   // Materials of the context never change, so they are left out by name even where all of the asset's may.
   std::vector<bool> chosen(static_cast<size_t>(scene.num_asset_materials()));
-  for (int m = 0; m < scene.num_asset_materials(); ++m)
-    chosen[static_cast<size_t>(m)] = is_chosen(options, m);
+  for (int m = 0; m < scene.num_asset_materials(); ++m) chosen[static_cast<size_t>(m)] = is_chosen(inputs, m);
   std::vector<Image> weights;
-  for (const views::View& view : views.views)
+  for (const views::View& view : inputs.views.views)
     weights.push_back(loss_weight(view.gbuffer, chosen, options.boundary_pixels));
   return weights;
 }
 
-std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const views::ViewSet& views,
+std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const FitInputs& inputs,
                                                std::span<const CachePixel> pixels,
                                                const FitOptions& options) {
   std::vector<asset::MaterialMaps> maps(scene.asset_materials().begin(), scene.asset_materials().end());
   for (int m = 0; m < scene.num_asset_materials(); ++m) {
-    if (!is_chosen(options, m)) continue;
+    if (!is_chosen(inputs, m)) continue;
     for (const asset::MapSlotRow& row : asset::kMapSlots) {
       if (!has(options.maps, row.slot)) continue;
       asset::Map& map = slot_map(maps[static_cast<size_t>(m)], row.slot);
-      const ivec2 size = enlarged_size(scene, views, pixels, options, m, map);
+      const ivec2 size = enlarged_size(scene, inputs.views, pixels, options, m, map);
       map = asset::resized(map, size.x, size.y);
       if (row.encoding == asset::MapEncoding::kNormal)
         for (size_t i = 0; i < map.texels.num_pixels(); ++i) {
@@ -143,15 +142,15 @@ std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const
   return maps;
 }
 
-FitState initial_state(const render::Scene& scene, const views::ViewSet& views,
+FitState initial_state(const render::Scene& scene, const FitInputs& inputs,
                        std::span<const CachePixel> pixels, std::span<const asset::MaterialMaps> base,
                        const FitOptions& options) {
   FitState state;
-  state.fitted = make_fitted_maps(scene, views, pixels, base, options);
+  state.fitted = make_fitted_maps(scene, inputs, pixels, base, options);
   state.late_parameters = parameters_of(state.fitted);
   state.cache_parameters.assign(CacheSchedule::kPlaces, state.late_parameters);
   state.cache_radiance.assign(CacheSchedule::kPlaces, std::vector<vec3>(pixels.size(), vec3(0.0f)));
-  for (const views::View& view : views.views)
+  for (const views::View& view : inputs.views.views)
     state.displacements.push_back(no_displacement(view.gbuffer.width, view.gbuffer.height));
   return state;
 }

@@ -9,21 +9,20 @@
 
 namespace patina::inverse {
 
-/// `options` again. Throws Error{kUsage} unless there is one edited image a view, of the view's size.
-FitOptions checked(const FitOptions& options, const render::Scene& scene, const views::ViewSet& views,
-                   std::span<const Image> edited);
+/// `inputs` again. Throws Error{kUsage} unless there is one edited image a view, of the view's size.
+FitInputs checked(const FitInputs& inputs, const render::Scene& scene);
 
 /// loss_weight of every view for the materials that may change.
-std::vector<Image> view_weights(const render::Scene& scene, const views::ViewSet& views,
+std::vector<Image> view_weights(const render::Scene& scene, const FitInputs& inputs,
                                 const FitOptions& options);
 
 /// The scene's asset materials, their fitted maps at the size that they will be written with.
-std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const views::ViewSet& views,
+std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const FitInputs& inputs,
                                                std::span<const CachePixel> pixels, const FitOptions& options);
 
 /// The state before the first iteration; `base` from enlarged_maps. No fitted maps where no view shows a
 /// surface with UVs and a material that may change.
-FitState initial_state(const render::Scene& scene, const views::ViewSet& views,
+FitState initial_state(const render::Scene& scene, const FitInputs& inputs,
                        std::span<const CachePixel> pixels, std::span<const asset::MaterialMaps> base,
                        const FitOptions& options);
 

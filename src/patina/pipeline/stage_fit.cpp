@@ -65,8 +65,6 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
                           const FitSettings& settings, RunFolder& run, const RunProgress& progress) {
   const std::string key = fit_key(bench, views, edited, settings);
   run.run_stage("fit", key, progress, [&] {
-    inverse::FitOptions options = settings.options;
-    options.materials = bench.enhanced;
     inverse::FitHooks hooks;
     hooks.on_checkpoint = [&](const inverse::FitCheckpoint& c) {
       run.save_checkpoint("fit", key, c.next_iteration, c.bytes);
@@ -81,14 +79,14 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
                                        .edited = edited,
                                        .rendered = preview.rendered,
                                        .loss = preview.loss,
-                                       .iterations = options.iterations});
+                                       .iterations = settings.options.iterations});
       progress.tell_preview(page);
     };
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
       (void)write_maps(so_far, bench, run, kPreviewFolder);
     };
-    const inverse::FitResult fitted =
-        inverse::fit_materials(*bench.scene, views.set, edited, options, hooks, progress);
+    const inverse::FitResult fitted = inverse::fit_materials(
+        *bench.scene, {views.set, edited, bench.enhanced}, settings.options, hooks, progress);
 
     RunFolder::StageResult result;
     WrittenMaps written = write_maps(fitted, bench, run, kFolder);
