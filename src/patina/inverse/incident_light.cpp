@@ -1,7 +1,6 @@
 #include "patina/inverse/incident_light.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
@@ -20,30 +19,6 @@ namespace {
 constexpr float kWideRoughness = 0.5f;
 
 constexpr int kMaxLights = 8;
-
-enum Strategy { kLights, kCosine, kNarrow, kWide, kNumStrategies };
-
-// How many of the directions each strategy makes. Metals have no diffuse lobe: their directions go to the
-// narrow one.
-std::array<int, kNumStrategies> shares(int num_directions, bool has_lights, float metallic) {
-  std::array<float, kNumStrategies> share{};
-  share[kLights] = has_lights ? 0.35f : 0.0f;
-  share[kCosine] = 0.3f - 0.2f * metallic;
-  share[kNarrow] = 0.25f + 0.2f * metallic;
-  share[kWide] = 0.15f;
-  float total = 0;
-  for (const float s : share) total += s;
-  std::array<int, kNumStrategies> count{};
-  int left = num_directions;
-  for (size_t s = 0; s < kNumStrategies; ++s) {
-    if (share[s] <= 0.0f) continue;
-    count[s] =
-        std::max(1, static_cast<int>(std::floor(share[s] / total * static_cast<float>(num_directions))));
-    left -= count[s];
-  }
-  count[kNarrow] += left;
-  return count;
-}
 
 // Radical inverse in base 2: with i/n the second coordinate of a Hammersley set.
 float radical_inverse(uint32_t i) {
@@ -72,6 +47,28 @@ LightGatherer::LightGatherer(const render::Scene& scene, std::span<const asset::
   directions_.resize(aims_.size());
 }
 
+// How many of the directions each strategy makes. Metals have no diffuse lobe: their directions go to the
+// narrow one.
+LightGatherer::Counts LightGatherer::shares(int num_directions, bool has_lights, float metallic) {
+  std::array<float, kNumStrategies> share{};
+  share[kLights] = has_lights ? 0.35f : 0.0f;
+  share[kCosine] = 0.3f - 0.2f * metallic;
+  share[kNarrow] = 0.25f + 0.2f * metallic;
+  share[kWide] = 0.15f;
+  float total = 0;
+  for (const float s : share) total += s;
+  Counts count{};
+  int left = num_directions;
+  for (size_t s = 0; s < kNumStrategies; ++s) {
+    if (share[s] <= 0.0f) continue;
+    count[s] =
+        std::max(1, static_cast<int>(std::floor(share[s] / total * static_cast<float>(num_directions))));
+    left -= count[s];
+  }
+  count[kNarrow] += left;
+  return count;
+}
+
 int LightGatherer::num_entries(const render::Scene& scene, const GatherOptions& options) {
   return options.num_directions + std::min(kMaxLights, static_cast<int>(scene.lights().size()));
 }
@@ -82,13 +79,9 @@ void LightGatherer::gather(const render::SurfacePoint& surface, const vec3& wo, 
   std::fill(entries.begin(), entries.end(), IncidentLight{surface.n_interpolated, vec3(0.0f)});
   const size_t num_punctual = entries.size() - aims_.size();
   gather_punctual(surface, random, entries.first(num_punctual));
-  entries = entries.subspan(num_punctual);
 
-  // Choose all directions.
-  const render::Lights& lights = scene_.light_sampler();
-  const auto counts = shares(options_.num_directions, lights.has_extended(), surface.bsdf.metallic);
-  const render::Frame frame(surface.n_shading);
-  const vec3 wo_local = frame.to_local(wo);
+  const Counts counts =
+      shares(options_.num_directions, scene_.light_sampler().has_extended(), surface.bsdf.metallic);
   LobeMixture mixture;
   mixture.n = surface.n_shading;
   mixture.wo = wo;
@@ -97,6 +90,17 @@ void LightGatherer::gather(const render::SurfacePoint& surface, const vec3& wo, 
   mixture.num_wide = static_cast<float>(counts[kWide]);
   mixture.alpha_narrow = render::alpha_from_roughness(surface.bsdf.roughness);
   mixture.alpha_wide = render::alpha_from_roughness(kWideRoughness);
+  choose_directions(surface, wo, mixture, counts, random);
+  lobe_densities(mixture, directions_, density_);
+  cast_rays(surface, static_cast<float>(counts[kLights]), random, entries.subspan(num_punctual));
+}
+
+void LightGatherer::choose_directions(const render::SurfacePoint& surface, const vec3& wo,
+                                      const LobeMixture& mixture, const Counts& counts,
+                                      RandomStream& random) {
+  const render::Lights& lights = scene_.light_sampler();
+  const render::Frame frame(surface.n_shading);
+  const vec3 wo_local = frame.to_local(wo);
   size_t next = 0;
   for (int strategy = 0; strategy < kNumStrategies; ++strategy) {
     const int count = counts[static_cast<size_t>(strategy)];
@@ -133,11 +137,12 @@ void LightGatherer::gather(const render::SurfacePoint& surface, const vec3& wo, 
       directions_.set(next, wi);
     }
   }
-  PATINA_CHECK_EQ(next, entries.size());
-  lobe_densities(mixture, directions_, density_);
+  PATINA_CHECK_EQ(next, aims_.size());
+}
 
-  // Cast the rays.
-  const auto num_lights = static_cast<float>(counts[kLights]);
+void LightGatherer::cast_rays(const render::SurfacePoint& surface, float num_lights, RandomStream& random,
+                              std::span<IncidentLight> entries) const {
+  const render::Lights& lights = scene_.light_sampler();
   for (size_t i = 0; i < aims_.size(); ++i) {
     const Aim& aim = aims_[i];
     if (!aim.valid) continue;

@@ -4,6 +4,7 @@
 // not just the one whose lobe helped to choose it.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,9 @@ class LightGatherer {
               std::span<IncidentLight> entries);
 
  private:
+  enum Strategy { kLights, kCosine, kNarrow, kWide, kNumStrategies };
+  using Counts = std::array<int, kNumStrategies>;  // of the directions that each strategy makes
+
   // What is known of a direction before its ray is cast.
   struct Aim {
     bool valid = false;
@@ -50,6 +54,13 @@ class LightGatherer {
     float distance = 0;                      // of the emitter that the direction was made for
   };
 
+  static Counts shares(int num_directions, bool has_lights, float metallic);
+  // Fills aims_ and directions_.
+  void choose_directions(const render::SurfacePoint& surface, const vec3& wo, const LobeMixture& mixture,
+                         const Counts& counts, RandomStream& random);
+  // What arrives along directions_, whose densities in the mixture of lobes are density_.
+  void cast_rays(const render::SurfacePoint& surface, float num_lights, RandomStream& random,
+                 std::span<IncidentLight> entries) const;
   void gather_punctual(const render::SurfacePoint& surface, RandomStream& random,
                        std::span<IncidentLight> entries) const;
   vec3 radiance_of_hit(const render::Ray& ray, const render::Hit& hit, RandomStream& random) const;
