@@ -225,7 +225,7 @@ TEST(Training, goes_from_pictures_to_a_model_that_edits) {
 
   diffusion::ModelPaths paths;
   paths.model = model;
-  const diffusion::Model trained(paths, {});
+  const diffusion::Model trained(find_model_parts(paths), {});
   diffusion::EditInputs inputs;
   inputs.tile_views = inputs.normal_views = {Image(64, 64, 3)};
   inputs.noise = diffusion::scheduler_noise(7, 0, 8 * 8 * 8);

@@ -30,7 +30,7 @@ void write_sheet(const std::filesystem::path& work, const std::filesystem::path&
   const SampleFolder samples(work / "held_out");
   diffusion::ModelPaths paths;
   paths.model = model_folder;
-  const diffusion::Model model(paths, {});
+  const diffusion::Model model(find_model_parts(paths), {});
   std::vector<Image> pictures;
   for (int row = 0; row < rows; ++row) {
     const at::Tensor sample = samples.pictures(row * samples.size() / rows);

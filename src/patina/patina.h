@@ -21,7 +21,8 @@
 //   views::render_views(scene, cameras, ...)   → ViewSet: renders, G-buffers and one exposure for all
 //   views::tile_control, views::normal_control the pictures that a diffusion model is conditioned on
 //   correspond::make_noise, bias_levels        what the views share: starting noise, corresponding pixels
-//   diffusion::Model(paths, options)           weights of a diffusion model
+//   diffusion::find_model_parts(paths)         the files of a diffusion model, opened and told apart
+//   diffusion::Model(parts, options)           its weights, loaded
 //   diffusion::edit_views(model, inputs, ...)  pictures and a prompt in, edited pictures out
 //   inverse::fit_materials(scene, views, ...)  → FitResult: maps whose renders look like the edited views
 //   asset::export_asset(asset, maps, ...)      the same file with new textures
@@ -51,6 +52,7 @@
 #include "patina/correspond/noise.h"
 #include "patina/diffusion/edit.h"
 #include "patina/diffusion/model.h"
+#include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/options.h"
 #include "patina/inverse/fit.h"
 

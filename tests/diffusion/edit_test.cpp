@@ -192,7 +192,7 @@ TEST(Detail, a_models_own_guidance_holds_where_none_is_given) {
   write_file(path / "model_index.json",
              std::string(R"({"_class_name": "StableDiffusionPipeline", "_negative_prompt": "blurry",
                              "_guidance_scale": 3})"));
-  const Model with_own({path, {}, {}, {}}, {Dtype::kF32});
+  const Model with_own(find_model_parts({path, {}, {}, {}}), {Dtype::kF32});
   const EditInputs inputs = made_inputs(1, 64);
   const auto edited = [&](const Model& model, std::optional<std::string> negative_prompt, float scale) {
     EditOptions options = short_options();
@@ -212,7 +212,7 @@ TEST(Detail, a_models_own_guidance_holds_where_none_is_given) {
 
   write_file(path / "model_index.json", std::string(R"({"_guidance_scale": 0})"));
   try {
-    const Model refused({path, {}, {}, {}}, {Dtype::kF32});
+    const Model refused(find_model_parts({path, {}, {}, {}}), {Dtype::kF32});
     ADD_FAILURE() << "took a guidance scale of 0";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("_guidance_scale is 0, expected 1 to 50"), std::string::npos)
@@ -290,12 +290,13 @@ TEST(Detail, predicted_memory_follows_views_guidance_and_what_stays_in_memory) {
   EXPECT_GT(guided, 64 * one.activations) << "large maps one prompt after the other";
   EXPECT_LT(guided, 2 * 64 * one.activations);
 
-  const Model streamed({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32, /*low_memory=*/true});
+  const Model streamed(find_model_parts({test::data_dir() / "tiny-sd", {}, {}, {}}),
+                       {Dtype::kF32, /*low_memory=*/true});
   EXPECT_LT(predict_memory(streamed, 4, 128, 128, options).weights, one.weights);
 }
 
 TEST(Detail, bf16_stays_near_f32) {
-  const Model model({test::data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kBf16});
+  const Model model(find_model_parts({test::data_dir() / "tiny-sd", {}, {}, {}}), {Dtype::kBf16});
   const EditInputs inputs = made_inputs(1, 128);
   EditOptions options = short_options();
   options.num_steps = 20, options.strength = 1;

@@ -51,7 +51,7 @@ class ThreeLevels : public testing::Test {
 };
 
 TEST_F(ThreeLevels, take_the_levels_that_fit_and_leave_the_coarser_ones) {
-  const Model model({path(), {}, {}, {}}, {Dtype::kF32});
+  const Model model(find_model_parts({path(), {}, {}, {}}), {Dtype::kF32});
   EditInputs inputs = made_inputs(2, 128);
   EditOptions options = short_options();
   options.num_steps = 2, options.strength = 1;
@@ -66,7 +66,7 @@ TEST_F(ThreeLevels, take_the_levels_that_fit_and_leave_the_coarser_ones) {
 }
 
 TEST_F(ThreeLevels, still_refuse_levels_that_are_no_resolution_of_theirs) {
-  const Model model({path(), {}, {}, {}}, {Dtype::kF32});
+  const Model model(find_model_parts({path(), {}, {}, {}}), {Dtype::kF32});
   EditInputs inputs = made_inputs(2, 128);
   inputs.bias_levels = same_place_bias(2, 12, 1);
   EXPECT_THROW(edit_views(model, inputs, short_options(), {}, {}), Error);

@@ -39,7 +39,7 @@ class ModelFolder : public testing::Test {
 
   std::string message(const ModelOptions& options = {}) const {
     try {
-      Model loaded({model(), {}, {}, {}}, options);
+      Model loaded(find_model_parts({model(), {}, {}, {}}), options);
     } catch (const Error& error) {
       return error.what();
     }
@@ -71,7 +71,7 @@ class ModelFolder : public testing::Test {
 };
 
 TEST_F(ModelFolder, loads_and_describes_itself) {
-  const Model model_({model(), {}, {}, {}}, {});
+  const Model model_(find_model_parts({model(), {}, {}, {}}), {});
   EXPECT_EQ(model_.latent_scale(), 8);
   EXPECT_EQ(model_.latent_channels(), 4);
   EXPECT_EQ(model_.dtype(), Dtype::kF32);  // small networks are not worth bf16
@@ -79,11 +79,12 @@ TEST_F(ModelFolder, loads_and_describes_itself) {
 }
 
 TEST_F(ModelFolder, devices_that_are_not_there_are_refused) {
-  const Model on_processor({model(), {}, {}, {}}, {.device = Device::kCpu});
+  const Model on_processor(find_model_parts({model(), {}, {}, {}}), {.device = Device::kCpu});
   EXPECT_EQ(on_processor.device(), Device::kCpu);
   EXPECT_NE(message({.dtype = Dtype::kF16, .device = Device::kCpu}).find("dtype: f16 is for CUDA alone"),
             std::string::npos);
-  if (Model({model(), {}, {}, {}}, {}).device() == Device::kCuda) GTEST_SKIP() << "there is a GPU here";
+  if (Model(find_model_parts({model(), {}, {}, {}}), {}).device() == Device::kCuda)
+    GTEST_SKIP() << "there is a GPU here";
   EXPECT_NE(message({.device = Device::kCuda}).find("no CUDA device here"), std::string::npos);
 }
 
@@ -135,7 +136,7 @@ TEST_F(ModelFolder, pickles_are_refused_with_the_reason) {
   write_file(model() / "unet" / "diffusion_pytorch_model.bin", "\x80\x04}.");
   expect_message("runs code");
   write_file(folder_.path() / "model.ckpt", "PK");
-  EXPECT_THROW(Model({folder_.path() / "model.ckpt", {}, {}, {}}, {}), Error);
+  EXPECT_THROW(Model(find_model_parts({folder_.path() / "model.ckpt", {}, {}, {}}), {}), Error);
 }
 
 TEST_F(ModelFolder, components_that_do_not_fit_each_other_are_refused) {

@@ -13,9 +13,10 @@
 namespace patina::test {
 
 using diffusion::EditInputs, diffusion::EditOptions, diffusion::Dtype, diffusion::Model, diffusion::Scheduler;
+using diffusion::find_model_parts;
 
 inline const Model& tiny_model() {
-  static const Model model({data_dir() / "tiny-sd", {}, {}, {}}, {Dtype::kF32});
+  static const Model model(find_model_parts({data_dir() / "tiny-sd", {}, {}, {}}), {Dtype::kF32});
   return model;
 }
 

@@ -7,8 +7,6 @@
 #include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/embedding.h"
 #include "patina/diffusion/list_models.h"
-#include "patina/diffusion/model.h"
-#include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/networks/controlnet.h"
 #include "patina/diffusion/networks/dry_run.h"
 #include "patina/diffusion/networks/text_encoder.h"
@@ -169,8 +167,7 @@ std::string check_path(const fs::path& path) {
   return text + "  All tensors are there, of the right shape, and finite.\n";
 }
 
-void check_model(const ModelPaths& paths, std::optional<Scheduler> scheduler) {
-  const ModelParts parts = find_model_parts(paths);
+void check_model(const ModelParts& parts, std::optional<Scheduler> scheduler) {
   if (scheduler) {
     if (const auto refusal = choose_scheduler(parts.scheduler, *scheduler).refusal) throw *refusal;
   }
@@ -178,10 +175,6 @@ void check_model(const ModelPaths& paths, std::optional<Scheduler> scheduler) {
   for (const TextPart& text : parts.texts) check_tensors(text.encoder);
   check_tensors(parts.vae);
   for (const ControlNetPart& controlnet : parts.controlnets) check_tensors(controlnet);
-}
-
-std::vector<fs::path> model_files(const ModelPaths& paths) {
-  return find_model_parts(paths).files;
 }
 
 }  // namespace patina::diffusion

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "patina/diffusion/files/network_part.h"
+#include "patina/diffusion/model_parts.h"
 
 namespace patina::diffusion {
 
@@ -14,6 +16,10 @@ void check_tensors(const UNetPart& part);
 void check_tensors(const VaePart& part);
 void check_tensors(const TextEncoderPart& part);
 void check_tensors(const ControlNetPart& part);
+
+/// All networks of a model; and throws Error that names a setting of `scheduler`, if one is given, that
+/// patina lacks.
+void check_model(const ModelParts& parts, std::optional<Scheduler> scheduler = std::nullopt);
 
 /// Throws Error{kFormat} naming the tensors that hold infinities or NaN. Reads all of the files.
 void check_values(const WeightFiles& files);

@@ -9,7 +9,6 @@
 #include "patina/base/error.h"
 #include "patina/diffusion/control_kinds.h"
 #include "patina/diffusion/files/unet_blocks.h"
-#include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/model_state.h"
 #include "patina/diffusion/networks/component.h"
 #include "patina/diffusion/prediction.h"
@@ -119,11 +118,10 @@ void check_device(Device device, Dtype dtype) {
     throw Error(ErrorCode::kUsage, "dtype", "f16 is for CUDA alone; on a processor take bf16 or f32");
 }
 
-Model::Model(const ModelPaths& paths, const ModelOptions& options) {
+Model::Model(const ModelParts& parts, const ModelOptions& options) {
   check_device(options.device, options.dtype);
 
   const c10::InferenceMode inference;
-  const ModelParts parts = find_model_parts(paths);
   const Device device = resolve(options.device);
   const Dtype dtype = resolve(options.dtype, device, parts.unet.table);
   const nn::Placement placement{scalar_type(dtype), device == Device::kCuda ? c10::kCUDA : c10::kCPU,

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "patina/diffusion/model.h"
-#include "patina/diffusion/model_parts.h"
 #include "patina/diffusion/networks/controlnet.h"
 #include "patina/diffusion/networks/held.h"
 #include "patina/diffusion/networks/unet.h"

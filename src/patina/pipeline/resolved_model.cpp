@@ -4,8 +4,10 @@
 
 #include <fmt/format.h>
 
+#include "patina/base/check.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/diffusion/check_model.h"
 
 namespace patina::pipeline {
 namespace {
@@ -22,32 +24,35 @@ std::string hash_of_files(const std::vector<fs::path>& files) {
   return hash_text(text);
 }
 
-std::vector<fs::path> find_files(const EditSettings& settings) {
+diffusion::ModelParts find_parts(const EditSettings& settings) {
   if (settings.model.model.empty())
     throw Error(
         ErrorCode::kUsage, "model",
         "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
         "2.x; `patina models DIR` lists those in a folder");
   diffusion::check_device(settings.device, settings.dtype);
-  diffusion::check_model(settings.model, settings.options.scheduler);
-  return diffusion::model_files(settings.model);
+  diffusion::ModelParts parts = diffusion::find_model_parts(settings.model);
+  diffusion::check_model(parts, settings.options.scheduler);
+  return parts;
 }
 
 }  // namespace
 
 struct ResolvedModel::State {
-  diffusion::ModelPaths paths;
   diffusion::ModelOptions options;
+  std::optional<diffusion::ModelParts> parts;  // until they are loaded: they keep the files mapped
   std::string hash;
   std::optional<diffusion::Model> model;
 };
 
 ResolvedModel::ResolvedModel(const EditSettings& settings)
     : state_(new State{
-          .paths = settings.model,
           .options = {.dtype = settings.dtype, .low_memory = settings.low_memory, .device = settings.device},
-          .hash = hash_of_files(find_files(settings)),
-          .model = std::nullopt}) {}
+          .parts = find_parts(settings),
+          .hash = {},
+          .model = std::nullopt}) {
+  state_->hash = hash_of_files(state_->parts->files);
+}
 
 ResolvedModel::~ResolvedModel() = default;
 ResolvedModel::ResolvedModel(ResolvedModel&&) noexcept = default;
@@ -58,7 +63,11 @@ const std::string& ResolvedModel::hash() const {
 }
 
 const diffusion::Model& ResolvedModel::loaded() {
-  if (!state_->model) state_->model.emplace(state_->paths, state_->options);
+  if (!state_->model) {
+    PATINA_CHECK(state_->parts.has_value());
+    state_->model.emplace(*state_->parts, state_->options);
+    state_->parts.reset();
+  }
   return *state_->model;
 }
 
@@ -68,6 +77,7 @@ bool ResolvedModel::is_loaded() const {
 
 void ResolvedModel::unload() {
   state_->model.reset();
+  state_->parts.reset();
 }
 
 }  // namespace patina::pipeline

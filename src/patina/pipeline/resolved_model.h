@@ -22,7 +22,8 @@ class ResolvedModel {
   /// Of the names, sizes and dates of all files: weights are gigabytes, these tell whether they changed.
   const std::string& hash() const;
 
-  /// The networks; loaded by the first call. They stay until unload().
+  /// The networks; loaded by the first call. They stay until unload(), after which they cannot be loaded
+  /// again.
   const diffusion::Model& loaded();
   bool is_loaded() const;
   void unload();

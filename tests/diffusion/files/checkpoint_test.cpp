@@ -26,7 +26,7 @@ make::Model small_model(Family family, ElementType type = ElementType::kF32) {
 }
 
 std::vector<Image> run(const ModelPaths& paths, Dtype dtype = Dtype::kF32, bool low_memory = false) {
-  const Model model(paths, {dtype, low_memory});
+  const Model model(find_model_parts(paths), {dtype, low_memory});
   EditOptions options = test::short_options();
   options.num_steps = 2, options.strength = 1;
   options.negative_prompt = "clean";
@@ -91,9 +91,9 @@ TEST_P(Checkpoint, every_layout_gives_the_same_picture_to_the_bit) {
   make::write_single_file(file("bare.safetensors"), model, {.vae = false, .text_encoder = false});
   ModelPaths bare = single;
   bare.model = file("bare.safetensors");
-  expect_in("holds no text encoder; name one", failure([&] { check_model(bare); }));
+  expect_in("holds no text encoder; name one", failure([&] { check_model(find_model_parts(bare)); }));
   bare.text_encoder = file("folder") / "text_encoder";
-  expect_in("holds no VAE; name one", failure([&] { check_model(bare); }));
+  expect_in("holds no VAE; name one", failure([&] { check_model(find_model_parts(bare)); }));
   bare.vae = single.model;
   expect_same(run(bare), expected);
 }
@@ -184,7 +184,7 @@ TEST_F(BrokenCheckpoint, is_told_before_the_first_use) {
   ModelPaths paths{path_, {}, control, control};
   paths.tokenizer = kTokenizer;
   expect_in("first_stage_model.decoder.conv_in.weight", failure([&] {
-              const Model model(paths, {Dtype::kF32, /*low_memory=*/true});
+              const Model model(find_model_parts(paths), {Dtype::kF32, /*low_memory=*/true});
             }));
 }
 
@@ -227,7 +227,7 @@ TEST_F(BrokenCheckpoint, models_of_other_tasks_are_named) {
       if (plan.name == "model.diffusion_model.input_blocks.0.0.weight") plan.shape[1] = 9;
     }
   });
-  expect_in("is an inpainting model", failure([&] { check_model({path_, {}, {}, {}}); }));
+  expect_in("is an inpainting model", failure([&] { check_model(find_model_parts({path_, {}, {}, {}})); }));
 }
 
 TEST_F(BrokenCheckpoint, infinities_are_named) {
