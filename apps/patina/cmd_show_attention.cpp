@@ -11,6 +11,17 @@
 #include "point_cli.h"
 
 namespace patina::app {
+namespace {
+
+void print_layers(const pipeline::Config& config, const GivenOptions& given) {
+  Console console(given.style());
+  for (const diffusion::AttentionLayer& layer : pipeline::list_attention_layers(config, console.progress()))
+    fmt::print("{:<32} {} × {} latent pixels, {} heads of {}\n", diffusion::short_name(layer), layer.width,
+               layer.height, layer.num_heads, layer.head_dim);
+}
+
+}  // namespace
+
 void add_show_attention(CLI::App& program) {
   CLI::App* command = program.add_subcommand("show-attention",
                                              "Show what one surface point attends to in the U-Net, without "
@@ -25,9 +36,11 @@ void add_show_attention(CLI::App& program) {
       ->group("Input and output");
   const auto point = add_point_options(*command, "What is shown");
   command
-      ->add_option("--layer", own->layer,
-                   "Self-attention of the U-Net, e.g. up_blocks.2.attentions.0; `--layer list` names all. "
-                   "[the last of the finest]")
+      ->add_option(
+          "--layer", own->layer,
+          "Self-attention of the U-Net, e.g. up_blocks.2.attentions.0; `--layer list` prints all and "
+          "does nothing else. "
+          "[the last of the finest]")
       ->type_name("NAME")
       ->group("What is shown");
   CLI::Option* const step =
@@ -42,6 +55,7 @@ void add_show_attention(CLI::App& program) {
     pipeline::Config config;
     apply_options(*given, config);
     config.inputs.asset = given->positional;
+    if (own->layer == "list") return print_layers(config, *given);
     require_prompt(config);
     if (own->output.empty())
       throw Error(ErrorCode::kUsage, "output", "say where the picture goes, e.g. -o attention.html");

@@ -43,6 +43,21 @@ TEST(RunFolder, runs_a_stage_once_for_one_key) {
   EXPECT_EQ(run.stages().size(), 1u);
 }
 
+TEST(RunFolder, goes_again_if_it_made_its_folder_and_nothing_ran_in_it) {
+  const test::TemporaryFolder folder;
+  const auto make = [&](const std::filesystem::path& path, const char* file) {
+    RunFolder run(path);
+    write_json(run.file(file), {});
+  };
+  make(folder.path() / "new" / "run", "config.json");
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "new"));
+  make(folder.path() / "used" / "run", ".detail.checkpoint");
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "used" / "run" / ".detail.checkpoint"));
+  std::filesystem::create_directory(folder.path() / "given");
+  make(folder.path() / "given", "config.json");
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "given" / "config.json"));
+}
+
 TEST(RunFolder, runs_again_when_an_output_is_missing) {
   const test::TemporaryFolder folder;
   RunFolder run(folder.path() / "run");

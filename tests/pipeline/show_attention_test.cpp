@@ -115,7 +115,7 @@ TEST(ShowAttention, wrong_requests_are_refused_with_what_would_do) {
     EXPECT_NE(found.find(part), std::string::npos) << found;
   };
   AttentionOptions options;
-  options.layer = "list";
+  options.layer = "none";
   expect(message(config, options), "16 × 16: down_blocks.0.attentions.0");
   options = {.point = {.view = 4}};
   expect(message(config, options), "expected 1 to 4, found 5");
@@ -156,6 +156,14 @@ TEST(ShowAttention, runs_from_the_command_line) {
   EXPECT_NE(result.error.find("keys are biased"), std::string::npos) << result.error;
   EXPECT_TRUE(fs::exists(out));
   EXPECT_TRUE(fs::exists(folder.path() / "attention.patina-run" / "views" / "tile_00.png"));
+
+  const test::ProcessResult listed =
+      test::run_process({command[0], "show-attention", command[2], "--layer", "list", "-m",
+                         config.edit.model.model.string(), "--views", "4", "--resolution", "64"},
+                        {.seconds = 120});
+  EXPECT_EQ(listed.exit_code, 0) << listed.error;
+  EXPECT_NE(listed.output.find("mid_block.attentions.0 "), std::string::npos) << listed.output;
+  EXPECT_NE(listed.output.find("16 × 16 latent pixels"), std::string::npos) << listed.output;
 
   command.insert(command.end(), {"--pixel", "12"});
   const test::ProcessResult refused = test::run_process(command, {.seconds = 120});

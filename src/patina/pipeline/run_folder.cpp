@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -20,6 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+
+constexpr std::array kOwnFiles{".lock", "config.json"};
 
 double peak_memory_mb() {
   return static_cast<double>(peak_resident_bytes()) / 1048576;
@@ -62,6 +65,9 @@ void write_json(const fs::path& path, const json& values) {
 
 RunFolder::RunFolder(const fs::path& path) : path_(path) {
   std::error_code failure;
+  for (fs::path at = fs::absolute(path_); at.has_relative_path() && !fs::exists(at, failure);
+       at = at.parent_path())
+    made_.push_back(at);
   if (fs::is_directory(path_, failure) && !fs::is_empty(path_, failure) && !fs::exists(path_ / ".lock") &&
       !fs::exists(path_ / "stages.json"))
     throw Error(ErrorCode::kUsage, "run",
@@ -89,7 +95,22 @@ RunFolder::RunFolder(const fs::path& path) : path_(path) {
 }
 
 RunFolder::~RunFolder() {
+  if (!made_.empty() && is_unused()) {
+    std::error_code ignored;
+    for (const char* file : kOwnFiles) fs::remove(path_ / file, ignored);
+    // Folders in which something else lies by now stay.
+    for (const fs::path& folder : made_) fs::remove(folder, ignored);
+  }
   ::close(lock_);
+}
+
+// Whether nothing lies here but what every run leaves before its first stage.
+bool RunFolder::is_unused() const {
+  std::error_code failure;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path_, failure))
+    if (std::find(kOwnFiles.begin(), kOwnFiles.end(), entry.path().filename()) == kOwnFiles.end())
+      return false;
+  return !failure;
 }
 
 const StageRecord* RunFolder::stage(std::string_view name) const {

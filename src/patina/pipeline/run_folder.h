@@ -35,7 +35,9 @@ struct StageRecord {
   std::vector<std::string> warnings;  // shown again in the report
 };
 
-/// One process at a time owns a run folder: the constructor takes a lock that ends with the process.
+/// One process at a time owns a run folder: the constructor takes a lock that ends with the process. A folder
+/// that the constructor made goes again with the object if no stage left anything in it: a run that was
+/// refused leaves nothing behind.
 class RunFolder {
  public:
   /// Makes the folder if it is missing. Throws Error{kUsage} for a folder that holds other things, Error{kIo}
@@ -87,6 +89,7 @@ class RunFolder {
 
  private:
   bool is_complete(const StageRecord& stage) const;
+  bool is_unused() const;
   struct ChangedByHand {
     std::string output, copy;
   };
@@ -96,6 +99,7 @@ class RunFolder {
   double peak_so_far_mb() const;
 
   std::filesystem::path path_;
+  std::vector<std::filesystem::path> made_;  // folders that were not there before, innermost first
   int lock_ = -1;
   bool keep_ = false;
   std::vector<StageRecord> stages_;

@@ -29,7 +29,19 @@ int32_t latent_pixel_at(const AttentionLayer& layer, int grid, int view, const v
   return (view / grid * rows + y) * static_cast<int>(layer.width) + view % grid * columns + x;
 }
 
+std::vector<AttentionLayer> layers_of(const diffusion::Model& model, const Workbench& bench) {
+  const int grid = views::grid_of(bench.cameras.size());
+  return diffusion::self_attention_layers(model, grid * bench.cameras[0].width,
+                                          grid * bench.cameras[0].height);
+}
+
 }  // namespace
+
+std::vector<AttentionLayer> list_attention_layers(Config config, const Progress& progress) {
+  settle(config);
+  ResolvedModel model(config.edit);
+  return layers_of(model.loaded(), open_workbench(config.inputs, progress));
+}
 
 ShownAttention show_attention(Config config, const AttentionOptions& options, RunFolder& run,
                               const RunProgress& progress) {
@@ -43,8 +55,7 @@ ShownAttention show_attention(Config config, const AttentionOptions& options, Ru
   const diffusion::Model& model = resolved.loaded();
   const render::Camera& camera = bench.cameras[0];
   const int grid = views::grid_of(bench.cameras.size());
-  const AttentionLayer layer = diffusion::find_layer(
-      diffusion::self_attention_layers(model, grid * camera.width, grid * camera.height), options.layer);
+  const AttentionLayer layer = diffusion::find_layer(layers_of(model, bench), options.layer);
 
   const RenderedViews views = render_stage(bench, config.render, run, progress);
   const PickedPoint point = pick_point(*bench.scene, views.set, options.point);

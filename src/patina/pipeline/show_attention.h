@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "patina/diffusion/attention_probe.h"
 #include "patina/pipeline/config.h"
@@ -26,6 +27,9 @@ struct ShownAttention {
   int view = 0;                 // of the query, counted from 0
   vec2 pixel{0.0f};             // where the point is seen in it
 };
+
+/// The self-attentions that can be shown, in the order in which they run. Loads the model.
+std::vector<diffusion::AttentionLayer> list_attention_layers(Config config, const Progress& progress);
 
 /// Renders the views into `run` (or takes those that are there), runs the model up to the evaluation, the
 /// bias acting as configured, and takes the row of the picked point. Throws Error{kUsage} where there is no
