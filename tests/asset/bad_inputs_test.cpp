@@ -9,15 +9,14 @@
 
 #include <gtest/gtest.h>
 
+#include "bad_inputs.h"
 #include "support.h"
 
 namespace {
 
 namespace fs = std::filesystem;
+using patina::test::BadInput;
 
-struct Case {
-  std::string kind, path, expect, what;
-};
 struct Result {
   std::string outcome, message;
   double seconds = 0;
@@ -31,26 +30,21 @@ std::vector<std::string> split(const std::string& line) {
   return cells;
 }
 
-std::vector<Case> manifest(const fs::path& folder) {
-  std::ifstream file(folder / "MANIFEST.tsv");
-  std::vector<Case> cases;
-  std::string line;
-  std::getline(file, line);
-  while (std::getline(file, line)) {
-    const auto cells = split(line);
-    const std::string kind = cells.at(0).substr(0, cells.at(0).find('/'));
-    if (kind != "safetensors")
-      cases.push_back({kind, (folder / cells.at(0)).string(), cells.at(1), cells.at(2)});
-  }
+// Those that are no models.
+std::vector<BadInput> assets_and_images(const fs::path& folder) {
+  std::vector<BadInput> cases = patina::test::read_bad_inputs(folder);
+  std::erase_if(cases, [](const BadInput& input) { return input.kind == "safetensors"; });
   return cases;
 }
 
 // Runs the probe over every second case; it prints one line a file.
-std::map<std::string, Result> probed(const std::vector<Case>& cases, size_t first, const fs::path& scratch) {
+std::map<std::string, Result> probed(const std::vector<BadInput>& cases, size_t first,
+                                     const fs::path& scratch) {
   const fs::path list = scratch / ("list" + std::to_string(first));
   {
     std::ofstream out(list);
-    for (size_t i = first; i < cases.size(); i += 2) out << cases[i].kind << '\t' << cases[i].path << '\n';
+    for (size_t i = first; i < cases.size(); i += 2)
+      out << cases[i].kind << '\t' << cases[i].path.string() << '\n';
   }
   std::map<std::string, Result> results;
   std::FILE* pipe = ::popen(("'" PATINA_BAD_INPUT_PROBE "' < '" + list.string() + "'").c_str(), "r");
@@ -77,32 +71,29 @@ bool is_plain_text(const std::string& text) {
 // Each case of a collection gets an answer or a clear refusal.
 void expect_judged(const fs::path& folder, size_t min_cases) {
   const patina::test::TemporaryFolder scratch;
-  const std::vector<Case> cases = manifest(folder);
+  const std::vector<BadInput> cases = assets_and_images(folder);
   ASSERT_GE(cases.size(), min_cases);
   auto second_half = std::async(std::launch::async, [&] { return probed(cases, 1, scratch.path()); });
   std::map<std::string, Result> results = probed(cases, 0, scratch.path());
   results.merge(second_half.get());
   ASSERT_EQ(results.size(), cases.size());
 
-  for (const Case& c : cases) {
-    const Result& r = results.at(c.path);
-    SCOPED_TRACE(c.path + " (" + c.what + ", " + c.expect + "): " + r.outcome + " " + r.message);
+  for (const BadInput& c : cases) {
+    const Result& r = results.at(c.path.string());
+    SCOPED_TRACE(c.path.string() + " (" + c.what + ", " + c.expect + "): " + r.outcome + " " + r.message);
     EXPECT_TRUE(r.outcome == "ok" || r.outcome == "error");
     if (c.expect == "accept") {
       EXPECT_EQ(r.outcome, "ok");
     }
-    // The collection is older than the rule that a missing picture costs its texture, not the asset.
-    const bool lacks_a_picture = fs::path(c.path).filename() == "mtl_map_missing.obj" ||
-                                 fs::path(c.path).filename() == "mtl_map_spaces.obj";
     if (c.expect == "reject") {
-      EXPECT_EQ(r.outcome, lacks_a_picture ? "ok" : "error");
+      EXPECT_EQ(r.outcome, "error");
     }
     EXPECT_LT(r.peak_mib, 2048);
     if (r.outcome != "error") continue;
-    EXPECT_NE(r.message.find(fs::path(c.path).filename().string().substr(0, 60)), std::string::npos)
+    EXPECT_NE(r.message.find(c.path.filename().string().substr(0, 60)), std::string::npos)
         << "the message does not name the file";
     EXPECT_TRUE(is_plain_text(r.message)) << "the message holds control characters or several lines";
-    EXPECT_GT(r.message.size(), c.path.size() + 10) << "the message does not name the fault";
+    EXPECT_GT(r.message.size(), c.path.string().size() + 10) << "the message does not name the fault";
   }
 }
 

@@ -2,14 +2,13 @@
 // accepted as the manifest says; no crash, no hang, no more memory than the file justifies.
 #include <algorithm>
 #include <atomic>
-#include <fstream>
 #include <mutex>
 #include <sstream>
 #include <thread>
 
 #include <gtest/gtest.h>
 
-#include "patina/base/error.h"
+#include "bad_inputs.h"
 #include "process.h"
 #include "support.h"
 
@@ -19,34 +18,10 @@ namespace {
 constexpr double kMaxSeconds = 10;
 constexpr double kMaxMemoryMb = 2048;
 
-struct Case {
-  std::string path, expect, what;
-};
-
-std::vector<Case> read_manifest(const std::filesystem::path& folder) {
-  std::ifstream file(folder / "MANIFEST.tsv");
-  std::vector<Case> cases;
-  std::string line;
-  std::getline(file, line);  // headings
-  while (std::getline(file, line)) {
-    std::istringstream fields(line);
-    Case c;
-    std::getline(fields, c.path, '\t');
-    std::getline(fields, c.expect, '\t');
-    std::getline(fields, c.what, '\t');
-    // A missing picture is a note, and the rest goes on; the shared collection expects a refusal.
-    const std::filesystem::path name = std::filesystem::path(c.path).filename();
-    if (name == "mtl_map_missing.obj" || name == "mtl_map_spaces.obj") c.expect = "accept";
-    cases.push_back(c);
-  }
-  return cases;
-}
-
 // Everything that is wrong with how patina took this file; empty: nothing.
-std::string judge(const std::filesystem::path& folder, const Case& c) {
-  const std::string path = (folder / c.path).string();
+std::string judge(const BadInput& c) {
   const ProcessResult result =
-      run_process({built_program("patina").string(), "info", path}, {.seconds = kMaxSeconds});
+      run_process({built_program("patina").string(), "info", c.path.string()}, {.seconds = kMaxSeconds});
   std::ostringstream faults;
   if (result.signal)
     faults << " ended by signal " << result.signal;
@@ -57,7 +32,7 @@ std::string judge(const std::filesystem::path& folder, const Case& c) {
   if (c.expect == "reject" && result.exit_code == 0) faults << " accepted: " << result.output.substr(0, 200);
   if (c.expect == "accept" && result.exit_code == 1) faults << " refused: " << result.error.substr(0, 300);
   if (result.exit_code == 1) {
-    const std::string name = std::filesystem::path(c.path).filename().string();
+    const std::string name = c.path.filename().string();
     if (!result.error.starts_with("patina: ")) faults << " message: " << result.error.substr(0, 200);
     if (result.error.find(name) == std::string::npos)
       faults << " message does not name the file: " << result.error.substr(0, 200);
@@ -76,7 +51,7 @@ std::string judge(const std::filesystem::path& folder, const Case& c) {
 }
 
 void expect_judged_as_the_manifest_says(const std::filesystem::path& folder, size_t min_cases) {
-  const std::vector<Case> cases = read_manifest(folder);
+  const std::vector<BadInput> cases = read_bad_inputs(folder);
   ASSERT_GE(cases.size(), min_cases);
   std::atomic<size_t> next{0};
   std::mutex mutex;
@@ -84,7 +59,7 @@ void expect_judged_as_the_manifest_says(const std::filesystem::path& folder, siz
   for (unsigned t = 0; t < std::max(2u, std::thread::hardware_concurrency()); ++t)
     threads.emplace_back([&] {
       for (size_t i; (i = next.fetch_add(1)) < cases.size();)
-        if (const std::string faults = judge(folder, cases[i]); !faults.empty()) {
+        if (const std::string faults = judge(cases[i]); !faults.empty()) {
           const std::lock_guard lock(mutex);
           ADD_FAILURE() << cases[i].path << " (" << cases[i].expect << ": " << cases[i].what
                         << "):" << faults;
