@@ -104,6 +104,77 @@ std::vector<Include> includes_of(const fs::path& root) {
 
 const fs::path kRoot = PATINA_SOURCE_DIR;
 
+std::vector<fs::path> sources_of(const fs::path& root) {
+  std::vector<fs::path> out;
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    const fs::path extension = entry.path().extension();
+    if (extension == ".h" || extension == ".cpp" || extension == ".inl" || extension == ".cu" ||
+        extension == ".cuh")
+      out.push_back(entry.path());
+  }
+  return out;
+}
+
+bool is_table_of_options(const fs::path& path) {
+  return path.parent_path().filename() == "pipeline" && path.filename().string().starts_with("options");
+}
+
+// The texts of all string literals, raw ones too, as they are written; comments are left out.
+std::vector<std::string> string_literals(const std::string& code) {
+  std::vector<std::string> out;
+  const auto starts = [&](size_t at, std::string_view text) {
+    return code.compare(at, text.size(), text) == 0;
+  };
+  for (size_t at = 0; at < code.size(); ++at) {
+    size_t end = std::string::npos;
+    if (starts(at, "//")) {
+      at = code.find('\n', at);
+    } else if (starts(at, "/*")) {
+      at = code.find("*/", at);
+    } else if (starts(at, "R\"")) {
+      const size_t open = code.find('(', at);
+      const std::string close = ")" + code.substr(at + 2, open - at - 2) + "\"";
+      end = code.find(close, open);
+      out.push_back(code.substr(open + 1, end - open - 1));
+      at = end == std::string::npos ? end : end + close.size() - 1;
+    } else if (code[at] == '"' || (code[at] == '\'' && (at == 0 || !std::isalnum(code[at - 1])))) {
+      for (end = at + 1; end < code.size() && code[end] != code[at]; ++end)
+        if (code[end] == '\\') ++end;
+      if (code[at] == '"') out.push_back(code.substr(at + 1, end - at - 1));
+      at = end;
+    }
+    if (at == std::string::npos) break;
+  }
+  return out;
+}
+
+// A function, or a block inside one.
+struct Block {
+  size_t first_line = 0, num_lines = 0;
+};
+
+// Functions of namespaces and classes, by the layout that clang-format gives them: from the closing brace,
+// alone on its line, up to the nearest line of the same depth that begins something.
+std::vector<Block> functions_of(const std::string& code) {
+  std::vector<std::string> lines;
+  std::istringstream text(code);
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  std::vector<Block> out;
+  for (size_t end = 0; end < lines.size(); ++end) {
+    const size_t depth = lines[end].find('}');
+    if ((depth != 0 && depth != 2) || lines[end] != std::string(depth, ' ') + "}") continue;
+    size_t first = end;
+    while (first-- > 0) {
+      const size_t begin = lines[first].find_first_not_of(' ');
+      if (begin != depth) continue;
+      const std::string_view rest = std::string_view(lines[first]).substr(begin);
+      if (!rest.starts_with("}") && !rest.starts_with("//") && !rest.starts_with("#")) break;
+    }
+    out.push_back({first + 1, end - first + 1});
+  }
+  return out;
+}
+
 std::string first_folder(const fs::path& path) {
   return path.begin()->string();
 }
@@ -214,6 +285,37 @@ TEST(Layering, the_library_does_nothing_that_only_a_program_may) {
     }
   }
   EXPECT_GT(num_checked, 10000) << "the scan found too little to mean anything";
+}
+
+// What a program shows of its flags belongs to its command line: the tables of options, of which --help is
+// made. Everything else in the library names a setting without dashes.
+TEST(Layering, the_library_names_no_flags_outside_the_tables_of_options) {
+  const std::regex flag(R"((^|[^\w-])--[a-z])"), css(R"(--[a-z]+:|var\(--[a-z]+\)|setProperty\("--[a-z]+")");
+  int num_checked = 0;
+  for (const fs::path& path : sources_of(kRoot / "src" / "patina")) {
+    if (is_table_of_options(path)) continue;
+    for (const std::string& text : string_literals(read_text_file(path))) {
+      EXPECT_FALSE(std::regex_search(std::regex_replace(text, css, ""), flag))
+          << path.string() << ": " << text;
+      ++num_checked;
+    }
+  }
+  EXPECT_GT(num_checked, 3000) << "the scan found too little to mean anything";
+}
+
+// Tables may be longer.
+TEST(Layering, functions_have_at_most_eighty_lines) {
+  constexpr size_t kMostLines = 80;
+  int num_checked = 0;
+  for (const char* folder : {"src", "apps"})
+    for (const fs::path& path : sources_of(kRoot / folder)) {
+      if (is_table_of_options(path)) continue;
+      for (const Block& function : functions_of(read_text_file(path))) {
+        EXPECT_LE(function.num_lines, kMostLines) << path.string() << ':' << function.first_line;
+        ++num_checked;
+      }
+    }
+  EXPECT_GT(num_checked, 2000) << "the scan found too little to mean anything";
 }
 
 TEST(Layering, the_rule_has_no_circles) {

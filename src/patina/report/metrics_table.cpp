@@ -43,7 +43,7 @@ constexpr std::array kMeasures{
             {0.7, 1},
             "90 % or more",
             "Share of the surface that at least one view sees. Unseen texels take the change around them, "
-            "smoothly, or keep their old values (<code>--unseen</code>)."},
+            "smoothly, or keep their old values if the run was told so."},
     Measure{
         "/consistency/edit_correlation",
         "Views agree, correlation",
@@ -141,7 +141,7 @@ constexpr Measure kDensity{"",
                            {0.5, kInfinity},
                            "1 or more",
                            "Along one side. Below 1 the views show more detail than the texture can hold; "
-                           "<code>--texture-size auto</code> makes it larger."};
+                           "the texture size <code>auto</code> makes it larger."};
 
 // The number under `key`, or nullopt where there is none.
 std::optional<double> number_at(const json& object, const char* key) {
