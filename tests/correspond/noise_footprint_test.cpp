@@ -174,7 +174,7 @@ TEST_F(NoiseFootprint, drawn_noise_has_the_correlation_of_polygons) {
   for (int p = 0; p < kSide * kSide; ++p)
     if (const auto partner = best(p)) patches.push_back({p, partner->first, partner->second});
   // 64 products a pair: the mean's deviation is 1/√(64 · 700) = 0.005 of a bound of one half.
-  EXPECT_NEAR(noise_agreement(patches, noises, 2, 0, 1).of_bound(), 1.0, 0.04);
+  EXPECT_NEAR(share_of_bound(noise_agreement(patches, noises, 2, 0, 1)), 1.0, 0.04);
 }
 
 TEST_F(NoiseFootprint, patches_found_by_rays_are_those_of_polygons) {

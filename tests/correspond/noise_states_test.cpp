@@ -115,7 +115,7 @@ TEST(NoiseStates, triangles_without_area_cost_nothing_of_the_bound) {
   const World world = degenerate_sphere_world();
   const auto cameras = cameras_at({0, 7, 20, 40}, 512);
   const auto noises = make_noises(*world.scene, cameras, 8, {.mode = NoiseMode::kExact}, seeds(4));
-  EXPECT_NEAR(noise_agreement(*world.scene, cameras, 8, noises, 0, 2).of_bound(), 1.0, 0.04);
+  EXPECT_NEAR(share_of_bound(noise_agreement(*world.scene, cameras, 8, noises, 0, 2)), 1.0, 0.04);
 }
 
 TEST(NoiseStates, neither_uvs_nor_materials_change_a_bit_of_exact_noise) {

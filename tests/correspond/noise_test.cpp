@@ -51,7 +51,7 @@ TEST(Noise, exact_reaches_the_bound_of_overlap_at_every_turn) {
     const NoiseAgreement agreement = noise_agreement(*world.scene, cameras, 8, noises, 0, other);
     EXPECT_GT(agreement.num_pairs, 500);
     EXPECT_GT(agreement.bound, 0.3);
-    EXPECT_NEAR(agreement.of_bound(), 1.0, 0.05) << "view " << other << ", bound " << agreement.bound;
+    EXPECT_NEAR(share_of_bound(agreement), 1.0, 0.05) << "view " << other << ", bound " << agreement.bound;
   }
 }
 
@@ -62,8 +62,8 @@ TEST(Noise, paper_loses_most_of_the_bound_where_texels_are_finer_than_its_sample
   const auto cameras = cameras_at({0, 7, 20, 40}, 512);
   const auto noises = noises_of(world, cameras, NoiseMode::kPaper);
   const NoiseAgreement agreement = noise_agreement(*world.scene, cameras, 8, noises, 0, 1);
-  EXPECT_LT(agreement.of_bound(), 0.5);
-  EXPECT_GT(agreement.of_bound(), 0.02);
+  EXPECT_LT(share_of_bound(agreement), 0.5);
+  EXPECT_GT(share_of_bound(agreement), 0.02);
   const NoiseStatistics mean = mean_statistics(noises, 2);
   EXPECT_NEAR(mean.mean, 0.0f, 0.02f);
   EXPECT_NEAR(mean.variance, 1.0f, 0.05f);
@@ -75,7 +75,7 @@ TEST(Noise, paper_follows_the_bound_where_its_samples_are_as_fine_as_texels) {
   std::vector<NoiseField> noises;
   for (uint64_t seed = 0; seed < kNumSeeds; ++seed)
     noises.push_back(make_noise(*world.scene, cameras, 8, {NoiseMode::kPaper, 256, seed}));
-  EXPECT_GT(noise_agreement(*world.scene, cameras, 8, noises, 0, 1).of_bound(), 0.6);
+  EXPECT_GT(share_of_bound(noise_agreement(*world.scene, cameras, 8, noises, 0, 1)), 0.6);
 }
 
 TEST(Noise, independent_views_are_unrelated) {
@@ -174,7 +174,7 @@ TEST(Noise, holes_of_a_mask_take_no_part) {
   const World world = make_world({{wall, {}}, {sheet, hole}});
   const auto cameras = cameras_at({-20, 0, 20, 40}, 256);
   const auto noises = noises_of(world, cameras, NoiseMode::kExact);
-  EXPECT_NEAR(noise_agreement(*world.scene, cameras, 8, noises, 0, 1).of_bound(), 1.0, 0.1);
+  EXPECT_NEAR(share_of_bound(noise_agreement(*world.scene, cameras, 8, noises, 0, 1)), 1.0, 0.1);
 }
 
 TEST(Noise, empty_view_is_white) {

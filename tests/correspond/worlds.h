@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../render/scenes.h"
+#include "patina/correspond/noise_agreement.h"
 #include "patina/render/scene.h"
 
 namespace patina::correspond::test {
@@ -49,5 +50,10 @@ World degenerate_sphere_world(int rings = 48);
 /// of `radius` just fits.
 std::vector<render::Camera> cameras_at(const std::vector<float>& azimuths_degrees, int resolution,
                                        float radius = 1.0f);
+
+/// How much of the correlation that two views can have at most their noise has.
+inline double share_of_bound(const NoiseAgreement& agreement) {
+  return agreement.bound > 0 ? agreement.correlation / agreement.bound : 0;
+}
 
 }  // namespace patina::correspond::test

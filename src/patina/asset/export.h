@@ -46,7 +46,7 @@ void export_obj(const ExportRequest& request);         // from OBJ
 void export_obj_as_glb(const ExportRequest& request);  // from OBJ
 
 /// Files that are written beside the output: collected first, written together before it, so that a failed
-/// export leaves no half.
+/// export leaves nothing incomplete.
 class SidecarFiles {
  public:
   explicit SidecarFiles(const ExportRequest& request) : request_(request) {}

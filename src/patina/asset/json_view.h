@@ -1,4 +1,4 @@
-// Typed, checked access to a JSON value that knows where it stands, so that every complaint names the file
+// Typed, checked access to a JSON value that knows where it stands, so that every error names the file
 // and the JSON path.
 #pragma once
 
@@ -15,8 +15,8 @@
 
 namespace patina::asset {
 
-/// Parses JSON text from a stranger: nesting and number of values are bounded before the parser allocates.
-/// Throws Error{kFormat, kLimit} with `file` as context.
+/// Parses JSON text of an untrusted file: nesting and number of values are bounded before the parser
+/// allocates. Throws Error{kFormat, kLimit} with `file` as context.
 nlohmann::json parse_json(std::string_view text, const std::string& file);
 
 /// A value inside a document. Views are cheap to copy; the document and the file's name must outlive them.
@@ -26,11 +26,11 @@ class JsonView {
 
   [[noreturn]] void fail(const std::string& message, ErrorCode code = ErrorCode::kFormat) const;
 
-  /// Member of an object; `find` gives nothing where there is none. Both throw if this is no object.
+  /// Member of an object; `find` gives nothing where there is none. Both throw if this is not an object.
   JsonView at(std::string_view key) const;
   std::optional<JsonView> find(std::string_view key) const;
 
-  /// Elements of an array; throws if this is none.
+  /// Elements of an array; throws if this is not an array.
   size_t size() const;
   JsonView operator[](size_t index) const;
 

@@ -1,4 +1,4 @@
-// Material maps: what a material is worth at every texel, factors multiplied in, linear. The renderer reads
+// Material maps: the values of a material at every texel, factors multiplied in, linear. The renderer reads
 // them, inverse rendering changes them, export writes them back.
 #pragma once
 

@@ -29,7 +29,7 @@ struct SourceDocument {
 
   Kind kind = Kind::kGltf;
   std::filesystem::path path;
-  std::string name;           // path as text, the context of every complaint
+  std::string name;           // path as text, the context of every error
   std::vector<uint8_t> file;  // all of it
 
   // glTF and GLB
@@ -60,8 +60,8 @@ struct SourceDocument {
 };
 
 /// What a small file may grow to in memory: flattened vertices (and triangles) of the whole asset, and bytes
-/// of decoded images. Both start generous and grow with the file, so that no few bytes of instancing or
-/// zero-filled accessors exhaust the machine.
+/// of decoded images. Both start generous and grow with the file, so that a few bytes of instancing or
+/// zero-filled accessors cannot exhaust memory.
 struct MemoryBudget {
   uint64_t vertices;
   uint64_t image_bytes;

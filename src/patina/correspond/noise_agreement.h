@@ -13,7 +13,6 @@ struct NoiseAgreement {
   double correlation = 0;  // E[n₁ n₂], over channels too
   double bound = 0;  // √(c₁ c₂) · overlap / √(A₁ A₂): what two windows onto one white field can have at most
   int64_t num_pairs = 0;
-  double of_bound() const { return bound > 0 ? correlation / bound : 0; }
 };
 
 /// Over `patches` of views `from` and `to` of the grid. Several `noises` of one kind and different seeds make

@@ -20,12 +20,12 @@ Image contact_sheet(std::span<const Image> images, int columns, int tile_width);
 
 /// Share of high-frequency energy kept: Σ m·(Y − blur(Y))² of `image` over that of `reference`, Y = Rec. 709
 /// luminance of the sRGB values, blur a Gaussian of σ = 1 pixel (half amplitude at 0.19 cycles/pixel)
-/// normalised inside the mask, so that the silhouette counts nothing; 1 means as sharp, more means noise.
-/// mask [H,W,1] in [0,1] or empty; NaN where it weighs nothing.
+/// normalised inside the mask, so that the silhouette does not count; 1 is as sharp, above 1 is noise.
+/// mask [H,W,1] in [0,1] or empty; NaN where it is zero everywhere.
 float sharpness_kept(const Image& image, const Image& reference, const Image& mask);
 
 /// Peak signal-to-noise ratio in dB over pixels weighted by `mask` ([H,W,1] or empty), peak 1. Infinity when
-/// equal, NaN where the mask weighs nothing.
+/// equal, NaN where the mask is zero everywhere.
 float psnr(const Image& a, const Image& b, const Image& mask = {});
 
 struct TexturePair {
