@@ -63,7 +63,7 @@ std::vector<Page> all_pages() {
   std::vector<Page> pages;
   for (const char* name : {"README.md", "CONTRIBUTING.md", "models/patina-mini/MODEL_CARD.md"})
     if (fs::exists(kRoot / name)) pages.push_back(read_page(kRoot / name));
-  for (const char* folder : {"docs", "mini", "tests/data", "tools"})
+  for (const char* folder : {"docs", "mini", "tests/data", "tools/dev"})
     if (fs::exists(kRoot / folder))
       for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder))
         if (entry.path().extension() == ".md") pages.push_back(read_page(entry.path()));
