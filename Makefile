@@ -3,6 +3,8 @@
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
+#   make check-blender      the tests of the Blender extension, in Blender without a window (docs/blender.md)
+#   make blender-extension  build/blender/patina_enhance.zip, which Blender installs
 #   make sanitise     the suites that finish in minutes, under the address and undefined-behaviour sanitisers
 #   make bench-noise, bench-attention, bench-inverse, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
 #   make gallery      the pictures of docs/gallery.md
@@ -28,7 +30,7 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: help build check sanitise demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build check check-blender blender-extension sanitise demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -44,6 +46,13 @@ check: setup
 	@cmake --preset release -DPATINA_BUILD_TESTS=ON -DPATINA_BUILD_BENCH=OFF -DPATINA_BUILD_MINI=$(MINI)
 	@cmake --build build/release --parallel $(JOBS)
 	@scripts/run_tests.sh build/release
+
+check-blender: build
+	@scripts/check_blender.sh
+
+blender-extension:
+	@blender/package.py build/blender/patina_enhance.zip
+	@echo "The extension:  $(CURDIR)/build/blender/patina_enhance.zip"
 
 SANITISED := base image asset views correspond attention
 sanitise: setup
