@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the pictures of docs/blender.md: the kettle, the panel while a run works, and after it.
+"""Makes the pictures of docs/blender.md: the panel before a run, while it works, and after it. The
+docs show cuts of them.
 
     xvfb-run -s "-screen 0 1280x800x24" blender --factory-startup --enable-event-simulate \\
         --window-geometry 0 0 1280 800 --python blender/screenshots.py -- PROGRAM FOLDER
@@ -84,6 +85,7 @@ def steps():
         yield 1.0
     frame()
     yield 3.0
+    shoot("panel.png")
     bpy.ops.patina.enhance()
     while "detail" not in runner.current().progress.finished_stages:
         yield 0.5
