@@ -2,7 +2,7 @@
 # Installs everything patina builds and runs with, from Debian 12's own packages. Safe to run again: it
 # asks dpkg first and touches the network only when something is missing.
 #   scripts/setup.sh            what `make build`, `make demo` and `make check` need
-#   scripts/setup.sh --ci       what .ci/run needs as well (clang-format, clang-tidy)
+#   scripts/setup.sh --ci       what .ci/run needs as well (clang-format, clang-tidy, Chromium)
 #   scripts/setup.sh --bench    the peers of the benchmarks as well (Blender)
 #   scripts/setup.sh --blender  what make check-blender needs as well (Blender, and a screen for its pictures)
 set -euo pipefail
@@ -16,7 +16,7 @@ packages=(
   nlohmann-json3-dev libglm-dev libcli11-dev libfmt-dev libxxhash-dev
   libgtest-dev libbenchmark-dev
 )
-if [[ "${1:-}" == "--ci" ]]; then packages+=(clang-format clang-tidy); fi
+if [[ "${1:-}" == "--ci" ]]; then packages+=(clang-format clang-tidy chromium); fi
 if [[ "${1:-}" == "--bench" ]]; then packages+=(blender python3-numpy); fi
 if [[ "${1:-}" == "--blender" ]]; then packages+=(blender python3-numpy xvfb libgl1-mesa-dri); fi
 

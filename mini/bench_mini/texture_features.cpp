@@ -6,20 +6,12 @@
 
 #include "patina/base/check.h"
 #include "patina/image/color.h"
+#include "patina/image/lab.h"
 
 namespace patina::bench {
 namespace {
 
 using Plane = std::vector<float>;
-
-// CIELAB of linear Rec. 709 under D65 [CIE15].
-vec3 lab_of(const vec3& rgb) {
-  const float x = (0.4124f * rgb.x + 0.3576f * rgb.y + 0.1805f * rgb.z) / 0.9505f;
-  const float y = 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
-  const float z = (0.0193f * rgb.x + 0.1192f * rgb.y + 0.9505f * rgb.z) / 1.089f;
-  const auto f = [](float t) { return t > 0.008856f ? std::cbrt(t) : 7.787f * t + 16.0f / 116.0f; };
-  return {116.0f * f(y) - 16.0f, 500.0f * (f(x) - f(y)), 200.0f * (f(y) - f(z))};
-}
 
 // A plane with clamped reads.
 struct Reader {
@@ -90,7 +82,8 @@ TexturePlanes texture_planes(const Image& srgb, const Image& coverage) {
   for (Plane& plane : out.lab) plane.resize(srgb.num_pixels());
   for (size_t i = 0; i < srgb.num_pixels(); ++i) {
     const float* p = &srgb.pixels[3 * i];
-    const vec3 lab = lab_of({linear_from_srgb(p[0]), linear_from_srgb(p[1]), linear_from_srgb(p[2])});
+    const vec3 lab =
+        lab_from_linear({linear_from_srgb(p[0]), linear_from_srgb(p[1]), linear_from_srgb(p[2])});
     for (int c = 0; c < 3; ++c) out.lab[c][i] = lab[c];
   }
 

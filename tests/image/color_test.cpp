@@ -1,5 +1,6 @@
 // Colour: the sRGB curve and tone mapping.
 #include "patina/image/color.h"
+#include "patina/image/lab.h"
 
 #include <gtest/gtest.h>
 
@@ -34,6 +35,19 @@ TEST(ToneMap, exposure_doubles_radiance) {
   Image image(2, 1, 3, 0.5f);
   const Image mapped = tone_map(image, 1.0f);
   for (const float v : mapped.pixels) EXPECT_NEAR(v, srgb_from_linear(0.5f), 1e-6f);
+}
+
+// Values of the sRGB primaries as published with the standard's matrices.
+TEST(Lab, of_white_grey_and_the_primaries) {
+  const auto expect_lab = [](const vec3& rgb, const vec3& lab) {
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(lab_from_linear(rgb)[i], lab[i], 0.1f) << i;
+  };
+  expect_lab({1, 1, 1}, {100, 0, 0});
+  expect_lab({0, 0, 0}, {0, 0, 0});
+  expect_lab(vec3(0.18418652f), {50, 0, 0});
+  expect_lab({1, 0, 0}, {53.24f, 80.09f, 67.20f});
+  expect_lab({0, 1, 0}, {87.73f, -86.18f, 83.18f});
+  expect_lab({0, 0, 1}, {32.30f, 79.19f, -107.86f});
 }
 
 }  // namespace

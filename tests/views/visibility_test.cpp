@@ -35,6 +35,21 @@ TEST(SeenShare, two_views_from_opposite_sides_share_nothing_of_a_sphere) {
   EXPECT_EQ(seen_share(scene, cameras, 2), 0.0f);
 }
 
+TEST(UnseenSurface, is_told_by_the_side_it_faces) {
+  const std::vector<scenes::Part> parts{{scenes::sphere(vec3(0.0f), 1.0f, 128), {}}};
+  const asset::Asset asset = scenes::make_asset(parts);
+  const render::Scene scene = make_scene(asset, scenes::make_maps(parts));
+  // From far above, the upper half is seen. The cap steeper than 45 degrees has (1 - cos 45°)/2 of a sphere.
+  const std::vector above{render::look_at(vec3(0, 1000, 0.001f), vec3(0.0f), 0.01f, 64, 64)};
+  const UnseenSurface unseen = unseen_surface(scene, above);
+  const float cap = 0.5f * (1.0f - std::sqrt(0.5f));
+  EXPECT_NEAR(unseen.down, cap, 0.005f);
+  EXPECT_EQ(unseen.up, 0.0f);
+  EXPECT_NEAR(unseen.sideways, 0.5f - cap, 0.005f);
+  EXPECT_NEAR(unseen.all(), 1.0f - seen_share(scene, above), 1e-6f);
+  EXPECT_NEAR(unseen_surface(scene, {}).all(), 1.0f, 1e-6f);
+}
+
 TEST(SeenShare, what_leaves_the_image_hides_or_turns_away_is_not_seen) {
   const auto front = scenes::quad(vec3(-1, -1, 0), vec3(2, 0, 0), vec3(0, 2, 0));
   const auto back = scenes::quad(vec3(-1, -1, -1), vec3(2, 0, 0), vec3(0, 2, 0));

@@ -6,9 +6,12 @@
 #include "patina/asset/map_slots.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/measures.h"
+#include "patina/pipeline/relight.h"
 #include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
+#include "patina/pipeline/what_changed.h"
 #include "patina/report/report.h"
+#include "patina/report/viewer.h"
 
 namespace patina::pipeline {
 
@@ -28,7 +31,7 @@ std::vector<Image> read_numbered(const RunFolder& run, std::string_view prefix,
 std::string report_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
                        const FittedMaterials& fitted, const ReportSettings& settings) {
   StageKey key(bench, settings);
-  key.add_materials(bench).add(views.set.exposure_ev).add(views.tile).add(edited);
+  key.add("in two other lights").add_materials(bench).add(views.set.exposure_ev).add(views.tile).add(edited);
   for (const asset::MaterialMaps& m : fitted.maps)
     for (const asset::MapSlotRow& row : asset::kMapSlots) key.add(slot_map(m, row.slot).texels);
   return key.hash();
@@ -110,11 +113,40 @@ RunFolder::StageResult measure_result(const Workbench& bench, const RenderedView
       {"psnr", json_number(mean_over_views(pictures, edited, weights, report::psnr))},
       {"sharpness", json_number(mean_over_views(pictures, edited, weights, report::sharpness_kept))},
       {"psnr_before", json_number(mean_over_views(views.tile, edited, weights, report::psnr))}};
+  result.metrics["materials"] = what_changed(bench, fitted);
+  result.metrics["unseen"] = what_was_not_seen(bench);
+  result.metrics["relight"] =
+      relight(bench, views, edited, pictures, weights, fitted, settings, run, result.outputs, progress);
   if (settings.turntable_frames > 0) {
     result.outputs.push_back("turntable.webp");
     write_turntable(bench, after, views.set.exposure_ev, settings, run.file(result.outputs.back()), progress);
   }
   return result;
+}
+
+// The asset that turns under the mouse, in the light of the views first.
+std::string viewer(const Workbench& bench, const FittedMaterials& fitted, std::span<const OtherLight> others,
+                   const json& relit, float exposure_ev) {
+  std::vector<report::ViewerLight> lights{{"Of the views", &bench.scene->environment(), exposure_ev}};
+  for (size_t i = 0; i < others.size(); ++i)
+    lights.push_back({others[i].title, &others[i].environment, relit.at("lights").at(i).at("exposure_ev")});
+  return report::viewer_data({&bench.asset, bench.maps, fitted.maps, fitted.changed, lights});
+}
+
+std::vector<report::RelitPictures> relit_pictures(const Workbench& bench, std::span<const OtherLight> lights,
+                                                  const RunFolder& run) {
+  std::vector<report::RelitPictures> all;
+  const std::vector<render::Camera> cameras = relight_cameras(bench);
+  for (const OtherLight& light : lights) {
+    report::RelitPictures pictures{.light = light.title, .before = {}, .after = {}};
+    for (size_t v = 0; v < cameras.size(); ++v)
+      for (const bool after : {false, true})
+        (after ? pictures.after : pictures.before)
+            .push_back(read_rgb_sized(run.file(relit_picture(light, after, v)), cameras[v].width,
+                                      cameras[v].height));
+    all.push_back(std::move(pictures));
+  }
+  return all;
 }
 
 // What the page says the run was asked for: config.json, as `patina` writes it.
@@ -148,6 +180,9 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
   if (const StageRecord* fit = run.stage("fit"))
     for (const json& loss : fit->metrics.value("loss", json::array()))
       page.loss.push_back(loss.is_number() ? loss.get<float>() : NAN);
+  const std::vector<OtherLight> lights = other_lights(bench);
+  page.relit = relit_pictures(bench, lights, run);
+  page.viewer = viewer(bench, fitted, lights, record.metrics.at("relight"), views.set.exposure_ev);
   page.config = asked_for(run);
   page.metrics = gather_metrics(run, record.metrics);
   page.warnings = bench.warnings;

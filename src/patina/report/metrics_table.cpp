@@ -26,6 +26,9 @@ struct Range {
 
 // One row of the table. The limits of the noise are those that its tests demand; the others are rules of
 // thumb.
+struct Words {
+  const char *good = "good", *fair = "fair", *poor = "poor";
+};
 struct Measure {
   const char* pointer;  // into the metrics
   const char* name;
@@ -33,6 +36,7 @@ struct Measure {
   Range good, fair;
   const char* target;  // `good` in words
   const char* meaning;
+  Words words = {};
 };
 
 constexpr std::array kMeasures{
@@ -67,8 +71,9 @@ constexpr std::array kMeasures{
         {27, kInfinity},
         {22, kInfinity},
         "27 dB or more",
-        "The asset rendered with its new textures against the edited views, in the light of the views. How "
-        "it looks in other light is for your eye."},
+        "The asset rendered with its new textures against the edited views, in their light, the only one in "
+        "which the edit is known. Close here says nothing of other light.",
+        {"close here", "near", "far"}},
     Measure{"/fit/sharpness",
             "Sharpness kept",
             Unit::kShare,
@@ -76,7 +81,8 @@ constexpr std::array kMeasures{
             {0.3, 1.6},
             "60 to 125 %",
             "Energy of fine detail in those renders over that of the edited views. Low: detail was averaged "
-            "away. Above 100 %: the textures or the renders add noise."},
+            "away. Above 100 %: the textures or the renders add noise.",
+            {"kept here", "partly", "lost or noisy"}},
     Measure{"/noise/mean",
             "Starting noise, mean",
             Unit::kNone,
@@ -166,9 +172,12 @@ std::string with_unit(double value, Unit unit) {
 
 // Said by word and shape as well as by colour.
 std::string verdict(const Measure& measure, double value) {
-  if (measure.good.holds(value)) return "<span class=\"good\">good</span>";
-  if (measure.fair.holds(value)) return "<span class=\"fair\">fair</span>";
-  return "<span class=\"poor\">poor</span>";
+  const auto marked = [](const char* mark, const char* word) {
+    return fmt::format("<span class=\"{}\">{}</span>", mark, word);
+  };
+  if (measure.good.holds(value)) return marked("good", measure.words.good);
+  if (measure.fair.holds(value)) return marked("fair", measure.words.fair);
+  return marked("poor", measure.words.poor);
 }
 
 std::string plain_value(const json& value) {
@@ -194,8 +203,10 @@ std::string text_row(const std::string& name, const std::string& text, const std
 
 std::string judged_row(const Measure& measure, const std::string& name, double value,
                        const std::string& meaning) {
-  return row(name, with_unit(value, measure.unit),
-             verdict(measure, value) + fmt::format("<small>good: {}</small>", measure.target), meaning);
+  return row(
+      name, with_unit(value, measure.unit),
+      verdict(measure, value) + fmt::format("<small>{}: {}</small>", measure.words.good, measure.target),
+      meaning);
 }
 
 std::string density_rows(const json& densities) {
@@ -230,6 +241,7 @@ bool is_fact(const std::string& pointer) {
 std::string other_rows(const json& value, const std::string& pointer) {
   if (is_fact(pointer) || (is_measure(pointer) && value.is_number())) return "";
   if ((pointer == kDensities && value.is_array()) || pointer == "/stages") return "";
+  if (pointer == "/materials" || pointer == "/unseen" || pointer == "/relight") return "";  // told elsewhere
   if (value.is_object()) {
     std::string rows;
     for (const auto& [key, child] : value.items()) rows += other_rows(child, pointer + "/" + key);

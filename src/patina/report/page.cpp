@@ -12,9 +12,10 @@
 #include "patina/report/html.h"
 #include "patina/report/loss_plot.h"
 #include "patina/report/metrics_table.h"
+#include "patina/report/page_files.h"
 #include "patina/report/page_parts.h"
-#include "patina/report/page_style.h"
 #include "patina/report/report.h"
+#include "patina/report/summary.h"
 
 namespace patina::report {
 namespace {
@@ -153,22 +154,48 @@ std::string textures(const ReportData& data) {
   return html + "</div>\n</section>\n";
 }
 
+std::string numbers(const ReportData& data) {
+  const std::string html =
+      page_details("Quality", "The marks are rules of thumb; your eye on the pictures above comes first.",
+                   metrics_table(data.metrics)) +
+      page_details("Fit", "How far the renders with the new textures are from the edited views.",
+                   loss_plot(data.loss)) +
+      page_details("Time and memory", "", stage_table(data.metrics));
+  return html.empty() ? "" : "<section>\n<h2>In numbers</h2>\n" + html + "</section>\n";
+}
+
+// The viewer's data, library and script. The library is a module of its own, unchanged: an import map gives
+// it a name, so that nothing has to be put together.
+std::string viewer_script(const ReportData& data) {
+  if (data.viewer.empty()) return "";
+  const auto module_uri = [](std::string_view text) {
+    return data_uri({reinterpret_cast<const uint8_t*>(text.data()), text.size()}, "text/javascript");
+  };
+  return fmt::format(
+      "<details>\n<summary>Licence of three.js, which draws the viewer</summary>\n<pre>{}</pre>\n</details>\n"
+      "<script type=\"application/json\" id=\"viewer-data\">{}</script>\n"
+      "<script type=\"importmap\">{{\"imports\":{{\"three\":\"{}\",\"three/controls\":\"{}\"}}}}</script>\n"
+      "<script type=\"module\">{}</script>\n",
+      escaped_lines(kThreeLicence), data.viewer, module_uri(kThreeLibrary), module_uri(kThreeControls),
+      kViewerScript);
+}
+
 }  // namespace
 
 void write_report(const std::filesystem::path& path, const ReportData& data) {
   std::string html = page_begin(data.title);
   html += heading(data);
+  html += summary(data.metrics, data.config);
   html += page_warnings(data.warnings);
+  if (!data.viewer.empty()) html += kViewerMarkup;
   html += turntable(path, data);
+  html += other_light(data.relit, data.metrics);
   html += views(data);
   html += textures(data);
-  html += page_section("Quality", "The marks are rules of thumb; your eye on the pictures above comes first.",
-                       metrics_table(data.metrics));
-  html += page_section("Fit", "How far the renders with the new textures are from the edited views.",
-                       loss_plot(data.loss));
-  html += page_section("Time and memory", "", stage_table(data.metrics));
+  html += numbers(data);
   html += page_config(data.config);
-  html += page_end(kPageScript);
+  html += viewer_script(data);
+  html += page_end(kWipeScript);
   write_file(path, html);
 }
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "patina/report/html.h"
-#include "patina/report/page_style.h"
+#include "patina/report/page_files.h"
 #include "patina/report/scale.h"
 #include "patina/report/webp.h"
 
@@ -24,7 +24,8 @@ std::string page_begin(std::string_view title, std::string_view style) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src "
       "'unsafe-inline'; "
-      "script-src 'unsafe-inline'\">\n<title>{} · patina</title>\n<style>{}{}</style>\n</head>\n<body>\n",
+      "script-src 'unsafe-inline' data:\">\n<title>{} · "
+      "patina</title>\n<style>{}{}</style>\n</head>\n<body>\n",
       escaped(title, 200), kPageStyle, style);
 }
 
@@ -63,6 +64,13 @@ std::string page_section(std::string_view title, std::string_view lead, const st
   std::string html = fmt::format("<section>\n<h2>{}</h2>\n", title);
   if (!lead.empty()) html += fmt::format("<p class=\"lead\">{}</p>\n", lead);
   return html + "<div class=\"scroll\">" + content + "</div>\n</section>\n";
+}
+
+std::string page_details(std::string_view title, std::string_view lead, const std::string& content) {
+  if (content.empty()) return "";
+  std::string html = fmt::format("<details>\n<summary>{}</summary>\n", title);
+  if (!lead.empty()) html += fmt::format("<p class=\"lead\">{}</p>\n", lead);
+  return html + "<div class=\"scroll\">" + content + "</div>\n</details>\n";
 }
 
 std::string page_config(const nlohmann::json& config) {

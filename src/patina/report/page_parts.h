@@ -24,6 +24,8 @@ std::string page_warnings(const std::vector<std::string>& warnings);
 /// A heading, a sentence (HTML; may be empty) and content that scrolls where it is too wide; empty without
 /// content.
 std::string page_section(std::string_view title, std::string_view lead, const std::string& content);
+/// The same folded: the title is seen, the rest on a click.
+std::string page_details(std::string_view title, std::string_view lead, const std::string& content);
 /// "Every value that was used", folded; empty if there is none.
 std::string page_config(const nlohmann::json& config);
 /// An image as a data URI, shrunk to `max_side` pixels. Colours are averaged in linear light; normals and

@@ -12,6 +12,7 @@
 #include "patina/image/image.h"
 #include "patina/render/path_tracer.h"
 #include "patina/render/scene.h"
+#include "patina/report/other_light.h"
 
 namespace patina::report {
 
@@ -38,9 +39,11 @@ struct ReportData {
   std::string prompt, negative_prompt;
   std::vector<Image> before, edited, after;  // one a view, sRGB
   std::vector<TexturePair> textures;
+  std::vector<RelitPictures> relit;
   std::vector<float> loss;
   nlohmann::json config, metrics;
   std::vector<std::string> warnings;
+  std::string viewer;               // viewer_data(); empty: nothing to turn
   std::filesystem::path turntable;  // relative to the page; empty: none (embedded as data)
 };
 

@@ -67,62 +67,110 @@ std::optional<vec2> seen_at(const render::Scene& scene, const render::Camera& ca
   return pixel;
 }
 
-// The area is cut into equal shares, one sample in each, at a random place of the triangle that holds the
-// share's random point: stratified over the surface, so 2^16 samples settle a share to about 0.2 %.
-float seen_share(const render::Scene& scene, std::span<const render::Camera> cameras, int min_views,
-                 int material) {
-  constexpr int64_t kNumSamples = 1 << 16;
+namespace {
+
+// Points of the asset's surface, of one material or (negative) all: the area is cut into equal shares, one
+// point in each, at a random place of the triangle that holds the share's random point. Stratified over the
+// surface, 2^16 points settle a share to about 0.2 %.
+class SurfacePoints {
+ public:
+  static constexpr int64_t kCount = 1 << 16;
+
+  SurfacePoints(const render::Scene& scene, int material) : scene_(scene) {
+    for (int primitive = 0; primitive < scene.num_asset_primitives(); ++primitive) {
+      const asset::Primitive& mesh = *scene.primitives()[static_cast<size_t>(primitive)];
+      if (material >= 0 && mesh.material != material) continue;
+      for (size_t triangle = 0; triangle < mesh.triangles.size(); ++triangle) {
+        const Place place{static_cast<uint32_t>(primitive), static_cast<uint32_t>(triangle)};
+        area_ += triangle_of(scene, place.primitive, place.triangle).area();
+        places_.push_back(place);
+        area_up_to_.push_back(area_);
+      }
+    }
+  }
+  bool empty() const { return !(area_ > 0.0); }
+
+  struct Point {
+    vec3 p_world;
+    vec3 n_world;  // not unit
+    bool double_sided, see_through;
+  };
+  Point operator[](int64_t index) const {
+    RandomStream random(0, RandomPurpose::kGBuffer, static_cast<uint64_t>(index));
+    const double at = area_ * (static_cast<double>(index) + random.uniform()) / static_cast<double>(kCount);
+    const auto upper = std::upper_bound(area_up_to_.begin(), area_up_to_.end(), at);
+    const Place place =
+        places_[std::min(static_cast<size_t>(upper - area_up_to_.begin()), places_.size() - 1)];
+    const Triangle triangle = triangle_of(scene_, place.primitive, place.triangle);
+    vec2 barycentric = random.uniform2();
+    if (barycentric.x + barycentric.y > 1.0f) barycentric = vec2(1.0f) - barycentric;
+    const int owner = scene_.primitives()[place.primitive]->material;
+    const asset::MaterialMaps& maps = scene_.materials()[static_cast<size_t>(owner)];
+    return {triangle.at(barycentric), triangle.cross(), maps.double_sided,
+            maps.alpha_mode != asset::AlphaMode::kOpaque};
+  }
+
+ private:
   struct Place {
     uint32_t primitive, triangle;
   };
-  std::vector<Place> places;
-  std::vector<double> area_up_to;
-  double area = 0;
-  for (int primitive = 0; primitive < scene.num_asset_primitives(); ++primitive) {
-    const asset::Primitive& mesh = *scene.primitives()[static_cast<size_t>(primitive)];
-    if (material >= 0 && mesh.material != material) continue;
-    for (size_t triangle = 0; triangle < mesh.triangles.size(); ++triangle) {
-      const Place place{static_cast<uint32_t>(primitive), static_cast<uint32_t>(triangle)};
-      area += triangle_of(scene, place.primitive, place.triangle).area();
-      places.push_back(place);
-      area_up_to.push_back(area);
-    }
-  }
-  if (!(area > 0.0)) return 0.0f;
+  const render::Scene& scene_;
+  std::vector<Place> places_;
+  std::vector<double> area_up_to_;
+  double area_ = 0;
+};
 
+bool is_seen(const render::Scene& scene, const render::Camera& camera, const SurfacePoints::Point& point) {
+  const vec3 to_eye = camera.position() - point.p_world;
+  const vec3 n_seen =
+      point.double_sided && glm::dot(point.n_world, to_eye) < 0.0f ? -point.n_world : point.n_world;
+  return seen_at(scene, camera, point.p_world, n_seen) &&
+         (!point.see_through || opaque_at(scene, camera.position(), point.p_world));
+}
+
+}  // namespace
+
+float seen_share(const render::Scene& scene, std::span<const render::Camera> cameras, int min_views,
+                 int material) {
+  const SurfacePoints points(scene, material);
+  if (points.empty()) return 0.0f;
   std::atomic<int64_t> num_seen{0};
-  parallel_for(0, kNumSamples, 1024, [&](int64_t begin, int64_t end) {
+  parallel_for(0, SurfacePoints::kCount, 1024, [&](int64_t begin, int64_t end) {
     int64_t seen = 0;
-    for (int64_t sample = begin; sample < end; ++sample) {
-      RandomStream random(0, RandomPurpose::kGBuffer, static_cast<uint64_t>(sample));
-      const double at =
-          area * (static_cast<double>(sample) + random.uniform()) / static_cast<double>(kNumSamples);
-      const auto upper = std::upper_bound(area_up_to.begin(), area_up_to.end(), at);
-      const auto index = std::min(static_cast<size_t>(upper - area_up_to.begin()), places.size() - 1);
-      const Place place = places[index];
-      const Triangle triangle = triangle_of(scene, place.primitive, place.triangle);
-      vec2 barycentric = random.uniform2();
-      if (barycentric.x + barycentric.y > 1.0f) barycentric = vec2(1.0f) - barycentric;
-      const vec3 p_world = triangle.at(barycentric);
-      vec3 n_world = triangle.cross();
-      const int owner = scene.primitives()[place.primitive]->material;
-      const asset::MaterialMaps& maps = scene.materials()[static_cast<size_t>(owner)];
-      const bool double_sided = maps.double_sided;
-      const bool see_through = maps.alpha_mode != asset::AlphaMode::kOpaque;
+    for (int64_t i = begin; i < end; ++i) {
+      const SurfacePoints::Point point = points[i];
       int views = 0;
       for (const render::Camera& camera : cameras) {
-        const vec3 n_seen =
-            double_sided && glm::dot(n_world, camera.position() - p_world) < 0.0f ? -n_world : n_world;
-        if (seen_at(scene, camera, p_world, n_seen) &&
-            (!see_through || opaque_at(scene, camera.position(), p_world)))
-          ++views;
+        if (is_seen(scene, camera, point)) ++views;
         if (views >= min_views) break;
       }
       if (views >= min_views) ++seen;
     }
     num_seen += seen;
   });
-  return static_cast<float>(static_cast<double>(num_seen.load()) / static_cast<double>(kNumSamples));
+  return static_cast<float>(static_cast<double>(num_seen.load()) /
+                            static_cast<double>(SurfacePoints::kCount));
+}
+
+UnseenSurface unseen_surface(const render::Scene& scene, std::span<const render::Camera> cameras) {
+  const SurfacePoints points(scene, -1);
+  if (points.empty()) return {};
+  constexpr float kSteep = 0.70710678f;  // sine of 45 degrees
+  std::atomic<int64_t> down{0}, up{0}, sideways{0};
+  parallel_for(0, SurfacePoints::kCount, 1024, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const SurfacePoints::Point point = points[i];
+      if (std::any_of(cameras.begin(), cameras.end(),
+                      [&](const render::Camera& camera) { return is_seen(scene, camera, point); }))
+        continue;
+      const float height = point.n_world.y / glm::length(point.n_world);
+      ++(height < -kSteep ? down : height > kSteep ? up : sideways);
+    }
+  });
+  const auto share = [](const std::atomic<int64_t>& count) {
+    return static_cast<float>(static_cast<double>(count.load()) / static_cast<double>(SurfacePoints::kCount));
+  };
+  return {share(down), share(up), share(sideways)};
 }
 
 }  // namespace patina::views

@@ -36,6 +36,14 @@ std::optional<FrontHit> front_hit(const render::Scene& scene, const render::Ray&
 std::optional<vec2> seen_at(const render::Scene& scene, const render::Camera& camera, const vec3& p_world,
                             const vec3& n_world);
 
+/// Which surface no view sees: shares of the asset's whole area, by the side to which it faces.
+struct UnseenSurface {
+  float down = 0, up = 0,
+        sideways = 0;  // normals more than 45 degrees below or above the horizon, and others
+  float all() const { return down + up + sideways; }
+};
+UnseenSurface unseen_surface(const render::Scene& scene, std::span<const render::Camera> cameras);
+
 /// True if nothing lies between the eye and p; neither facing nor the image's frame is asked for.
 bool unoccluded(const render::Scene& scene, const vec3& eye, const vec3& p_world);
 
