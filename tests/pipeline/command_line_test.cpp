@@ -156,6 +156,23 @@ TEST(CommandLine, a_config_file_holds_options_and_the_command_line_wins) {
   expect_refused(1, {kettle(), "--config", "missing.toml"}, {"missing.toml"});
 }
 
+TEST(CommandLine, a_comparison_wants_two_finished_runs_and_nothing_to_run) {
+  const TemporaryFolder folder;
+  const std::string run = folder.path().string();
+  const auto expect = [](int exit_code, const std::vector<std::string>& arguments, const std::string& words) {
+    const ProcessResult result = patina(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << result.error;
+    EXPECT_NE(result.error.find(words), std::string::npos) << words << " is not in: " << result.error;
+  };
+  expect(2, {"report", "--compare", run}, "two run folders or more");
+  expect(2, {"report", run, "--page", "x.html"}, "is for --compare");
+  expect(2, {"report", "--seed", "1", "--compare", run, run}, "has no effect with --compare");
+  expect(1, {"report", "--compare", run, run}, "is not a run folder");
+  write_file(folder.path() / "config.json", std::string_view("{}"));
+  write_file(folder.path() / "stages.json", std::string_view("[]"));
+  expect(1, {"report", run, "--compare", run}, "has no report yet");
+}
+
 TEST(CommandLine, stages_say_what_comes_first) {
   const TemporaryFolder folder;
   const ProcessResult result = patina({"detail", folder.path().string()});

@@ -104,9 +104,23 @@ TEST(Enhance, writes_asset_report_and_metrics) {
   for (int x = 0; x < tile.width; ++x) EXPECT_EQ(edited.rgb(x, 0), tile.rgb(x, 0));
   EXPECT_NE(edited.pixels, tile.pixels);
   EXPECT_GT(fs::file_size(run / "report.html"), 10000u);
+  EXPECT_LT(fs::file_size(run / "report.html"), 12u << 20);
+  EXPECT_NE(read_text_file(run / "report.html").find("id=\"viewer-data\""), std::string::npos);
   EXPECT_GT(fs::file_size(run / "turntable.webp"), 1000u);
   EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "config.json")).at("options").at("prompt"),
             "a rusty old kettle");
+
+  // The other lights were rendered, and two runs stand side by side.
+  EXPECT_EQ(metrics.at("relight").at("lights").size(), 2u);
+  EXPECT_TRUE(fs::exists(run / "report" / "low_sun_after_01.png"));
+  fs::copy(run, folder.path() / "copy.patina-run", fs::copy_options::recursive);
+  const fs::path page = folder.path() / "comparison.html";
+  run_ok({built_program("patina").string(), "report", "--compare", run.string(),
+          (folder.path() / "copy.patina-run").string(), "--page", page.string()});
+  const std::string html = read_text_file(page);
+  for (const char* part :
+       {"out.patina-run", "copy.patina-run", "alt=\"View 4, Before\"", "a rusty old kettle"})
+    EXPECT_NE(html.find(part), std::string::npos) << part;
 }
 
 TEST(Enhance, a_killed_run_continues_and_gives_the_same_bytes) {

@@ -7,6 +7,7 @@
 #include "patina/base/files.h"
 #include "patina/report/ablation_page.h"
 #include "patina/report/attention_page.h"
+#include "patina/report/comparison_page.h"
 #include "patina/report/fit_preview.h"
 #include "pictures.h"
 
@@ -192,6 +193,47 @@ TEST(FitPreview, shows_views_and_loss_and_reloads_until_the_fit_is_done) {
   EXPECT_NE(running.find("class=\"curve\""), std::string::npos);
   page.iterations = 3;
   EXPECT_EQ(preview_of(page).find("location.reload"), std::string::npos);
+}
+
+ComparedRun compared(const std::string& name, int seed) {
+  return {.name = name,
+          .asset = "kettle.glb",
+          .prompt = "prompt of " + name,
+          .negative_prompt = "clean",
+          .options = {{"seed", seed}, {"strength", 0.75}, {"output", name + ".glb"}},
+          .metrics = {{"coverage", 0.5}, {"fit", {{"psnr", 27.5}}}},
+          .after = {test::noise_picture(16, 16, 1), test::noise_picture(16, 16, 2)},
+          .turntable = {}};
+}
+
+std::string page_of(const ComparisonData& data) {
+  const test::TemporaryFolder folder;
+  write_comparison(folder.path() / "comparison.html", data);
+  return read_text_file(folder.path() / "comparison.html");
+}
+
+TEST(ComparisonPage, lays_runs_side_by_side_and_lists_only_options_that_differ) {
+  const std::string html = page_of({{compared("rusty", 3), compared("mossy", 4)}, {}});
+  expect_balanced(html);
+  expect_self_contained(html);
+  EXPECT_EQ(count(html, "<img"), 4u);
+  for (const char* part : {"prompt of rusty", "prompt of mossy", "away from", "seed 3 · strength 0.75",
+                           "<th scope=\"row\">seed</th><td>3</td><td>4</td>", "27.5 dB", "50.0 %"})
+    EXPECT_NE(html.find(part), std::string::npos) << part;
+  EXPECT_EQ(html.find(">strength<"), std::string::npos) << "the same in both";
+  EXPECT_EQ(html.find(">output<"), std::string::npos) << "says nothing of the result";
+}
+
+TEST(ComparisonPage, shows_the_views_before_once_and_runs_of_unlike_size) {
+  ComparisonData data{{compared("a", 1), compared("b", 1), compared("c", 1)},
+                      {test::noise_picture(16, 16, 9)}};
+  data.runs[1].after.clear();
+  data.runs[2].metrics = data.runs[2].options = nlohmann::json();
+  data.runs[0].name = data.runs[0].prompt = kHostile;
+  const std::string html = page_of(data);
+  expect_balanced(html);
+  EXPECT_EQ(count(html, "<img"), 5u);
+  EXPECT_EQ(count(html, "<figcaption>Before"), 1u);
 }
 
 }  // namespace
