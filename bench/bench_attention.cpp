@@ -17,6 +17,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "console/program.h"
 #include "libtorch_attention.h"
 #include "matrix_peak.h"
 #include "patina/asset/material_maps.h"
@@ -123,18 +124,8 @@ const char* name_of(Element element) {
   return element == Element::kF32 ? "f32" : "bf16";
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const std::filesystem::path report =
-      argc > 1 ? std::filesystem::path(argv[1])
-               : std::filesystem::path(argv[0]).parent_path() / "bench" / "attention.json";
-  const std::filesystem::path asset = argc > 2 ? argv[2] : "examples/kettle.glb";
-  const int threads = num_threads();
-  std::printf("%s from nine views of 512²; %d threads; LibTorch %s\n", asset.c_str(), threads,
-              bench::libtorch_version().c_str());
-  const std::vector<KeyBuckets> levels = buckets_of(asset);
-
+// The processor's own peak, and what LibTorch reaches of it.
+nlohmann::json measure_peak() {
   nlohmann::json json;
   const CpuIsa best_isa = supported_isas(Element::kBf16).back();
   const double peak = bench::matrix_peak_gflops(best_isa);
@@ -147,9 +138,12 @@ int main(int argc, char** argv) {
     std::printf(", %.0f with Gaussian operands from the first cache",
                 json["loaded_tile_gflops"].get<double>());
   std::printf("; LibTorch's 2048³ bf16 product %.0f\n\n", json["libtorch_matmul_gflops"].get<double>());
+  return json;
+}
 
+// Kernels on one core. Adds to `json`.
+void measure_kernels(const std::vector<KeyBuckets>& levels, nlohmann::json& json) {
   // The U-Net's own sizes: levels 1 to 3 of Stable Diffusion 1.5.
-  set_num_threads(1);
   std::printf("%-12s %-5s %6s %4s %5s %9s %6s %9s %7s\n", "kernel", "type", "tokens", "dim", "heads",
               "GFLOP/s", "share", "biased", "ratio");
   const struct {
@@ -194,8 +188,10 @@ int main(int argc, char** argv) {
     }
   json["biased_over_dense"] = biased_total / dense_total;
   std::printf("biased over dense, all three levels: %.3f\n\n", biased_total / dense_total);
+}
 
-  set_num_threads(threads);
+// All cores against LibTorch's attention. Adds to `json`.
+void compare_with_libtorch(int threads, nlohmann::json& json) {
   std::printf("%6s %4s %5s %9s %9s %7s  LibTorch's fastest\n", "tokens", "dim", "heads", "ours s", "LibTorch",
               "ratio");
   double smallest = std::numeric_limits<double>::infinity();
@@ -223,8 +219,32 @@ int main(int argc, char** argv) {
   }
   json["speedup_over_libtorch"] = smallest;
   json["libtorch_version"] = bench::libtorch_version();
+}
+
+void run(const std::filesystem::path& report, const std::filesystem::path& asset) {
+  const int threads = num_threads();
+  std::printf("%s from nine views of 512²; %d threads; LibTorch %s\n", asset.c_str(), threads,
+              bench::libtorch_version().c_str());
+  const std::vector<KeyBuckets> levels = buckets_of(asset);
+  nlohmann::json json = measure_peak();
+  set_num_threads(1);
+  measure_kernels(levels, json);
+  set_num_threads(threads);
+  compare_with_libtorch(threads, json);
   json["threads"] = threads;
   json["asset"] = asset.filename().string();
   write_file(report, json.dump(1));
   std::printf("wrote %s\n", report.c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App program("The attention of a U-Net over nine views of a real asset, dense and biased.",
+                   "bench_attention");
+  std::filesystem::path report = std::filesystem::path(argv[0]).parent_path() / "bench" / "attention.json",
+                        asset = "examples/kettle.glb";
+  program.add_option("OUT.json", report, "JSON to write")->capture_default_str();
+  program.add_option("ASSET", asset, "Whose views give the bias")->capture_default_str();
+  return tools::run_program(program, argc, argv, [&] { run(report, asset); });
 }

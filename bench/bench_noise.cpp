@@ -3,7 +3,7 @@
 //
 //   bench_noise [--out FILE] [--only TEXT] [--seeds N]   every asset with UVs, or those whose path holds TEXT
 //   bench_noise --sweep ASSET                            share of the bound against samples a latent pixel
-//   bench_noise --picture ASSET OUT.png [VIEWS]          two neighbours of VIEWS (default 51) views a turn
+//   bench_noise --picture ASSET OUT.png [--views 51]     two neighbours of so many views a turn
 //
 // Assets are those of $PATINA_SHARED, else ../shared; FILE is build/bench/noise.json unless given. Takes some
 // five minutes on two cores. What the figures mean: docs/noise.md.
@@ -15,6 +15,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "console/program.h"
 #include "noise_measure.h"
 #include "noise_picture.h"
 #include "patina/base/error.h"
@@ -133,7 +134,7 @@ struct Summary {
   }
 };
 
-int measure_all(const fs::path& assets, const fs::path& out, const std::string& only, int num_seeds) {
+void measure_all(const fs::path& assets, const fs::path& out, const std::string& only, int num_seeds) {
   std::vector<fs::path> files = asset_files(assets);
   std::erase_if(files, [&](const fs::path& file) { return file.string().find(only) == std::string::npos; });
   std::printf("%d threads, %d seeds; shares of the bound over all pairs of nine views, and at 7 degrees\n",
@@ -175,11 +176,12 @@ int measure_all(const fs::path& assets, const fs::path& out, const std::string& 
   all["assets"] = std::move(rows);
   write_file(out, all.dump(1));
   std::printf("wrote %s\n", out.c_str());
-  return summary.num_assets > 0 ? 0 : 1;
+  if (summary.num_assets == 0)
+    throw Error(ErrorCode::kNotFound, assets.string(), "holds no asset with UVs that could be measured");
 }
 
 // Share of the bound, whiteness on the surface and cost of nine 512² views against samples a latent pixel.
-int sweep(const fs::path& file) {
+void sweep(const fs::path& file) {
   constexpr int kSeeds = 64;
   const asset::Asset asset = asset::read_asset(file);
   const render::Scene scene(asset, asset::resolve_materials(asset), render::constant_environment(vec3(1.0f)));
@@ -208,58 +210,40 @@ int sweep(const fs::path& file) {
   for (const int points : {3, 12, 48, 192})
     print_row("exact, " + std::to_string(points) + " points",
               {.mode = kExact, .points_per_latent = static_cast<float>(points)});
-  return 0;
 }
 
-int usage() {
-  std::fprintf(stderr,
-               "usage: bench_noise [--out FILE] [--only TEXT] [--seeds N]\n"
-               "       bench_noise --sweep ASSET\n"
-               "       bench_noise --picture ASSET OUT.png [VIEWS]\n");
-  return 2;
-}
-
-int run(const std::vector<std::string>& arguments) {
+void run_all(const fs::path& out, const std::string& only, int num_seeds) {
   const char* shared = std::getenv("PATINA_SHARED");
   const fs::path assets = fs::path(shared ? shared : "../shared") / "assets";
-  fs::path out = "build/bench/noise.json";
-  std::string only;
-  int num_seeds = 32;
-  for (size_t i = 0; i < arguments.size(); ++i) {
-    const size_t left = arguments.size() - i - 1;
-    if (arguments[i] == "--sweep" && left == 1) return sweep(arguments[i + 1]);
-    if (arguments[i] == "--picture" && (left == 2 || left == 3)) {
-      const int views = left == 3 ? std::stoi(arguments[i + 3]) : 51;
-      write_image(arguments[i + 2], noise_picture(asset::read_asset(arguments[i + 1]), views));
-      return 0;
-    }
-    if (left < 1) return usage();
-    const std::string& value = arguments[i + 1];
-    if (arguments[i] == "--out")
-      out = value;
-    else if (arguments[i] == "--only")
-      only = value;
-    else if (arguments[i] == "--seeds")
-      num_seeds = std::max(std::stoi(value), 1);
-    else
-      return usage();
-    ++i;
-  }
-  if (!fs::exists(assets)) {
-    std::fprintf(stderr, "%s does not exist; set PATINA_SHARED to the folder that holds assets/\n",
-                 assets.c_str());
-    return 1;
-  }
-  return measure_all(assets, out, only, num_seeds);
+  if (!fs::exists(assets))
+    throw Error(ErrorCode::kNotFound, assets.string(),
+                "does not exist; set PATINA_SHARED to the folder that holds assets/");
+  measure_all(assets, out, only, num_seeds);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run({argv + 1, argv + argc});
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_noise: %s\n", error.what());
-    return 1;
-  }
+  CLI::App program("View-correlated noise on real assets: whiteness, correlation between views, seconds.",
+                   "bench_noise");
+  fs::path out = "build/bench/noise.json", swept;
+  std::string only;
+  int num_seeds = 32, num_views = 51;
+  std::vector<std::string> pictured;
+  program.add_option("--out", out, "JSON to write")->capture_default_str();
+  program.add_option("--only", only, "Assets whose path holds this text");
+  program.add_option("--seeds", num_seeds, "Of an asset")->check(CLI::PositiveNumber)->capture_default_str();
+  CLI::Option* sweep_option =
+      program.add_option("--sweep", swept, "ASSET: share of the bound against samples a latent pixel");
+  program.add_option("--picture", pictured, "ASSET OUT.png: the noise of two neighbouring views")
+      ->expected(2)
+      ->excludes(sweep_option);
+  program.add_option("--views", num_views, "Of a turn, in the picture")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  return tools::run_program(program, argc, argv, [&] {
+    if (!swept.empty()) return sweep(swept);
+    if (pictured.empty()) return run_all(out, only, num_seeds);
+    write_image(pictured[1], noise_picture(asset::read_asset(pictured[0]), num_views));
+  });
 }

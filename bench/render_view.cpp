@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <string>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "console/program.h"
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
@@ -88,7 +88,7 @@ Image side_by_side(const Image& radiance, const Image& reference, float exposure
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Renders one view of an asset with patina's path tracer"};
+  CLI::App app("Renders one view of an asset with patina's path tracer", "bench_render_view");
   std::filesystem::path asset_path, out_path, environment_path, reference_path, picture_path, report_path;
   float fov_degrees = 35.0f, exposure_ev = 0.0f;
   int size = 512, samples = 64, depth = 8;
@@ -112,9 +112,7 @@ int main(int argc, char** argv) {
   app.add_option("--picture", picture_path, "PNG to write: render, reference, 4 x their difference")
       ->needs("--reference");
   app.add_option("--report", report_path, "JSON to write: what differs by how much")->needs("--reference");
-  CLI11_PARSE(app, argc, argv);
-
-  try {
+  return tools::run_program(app, argc, argv, [&] {
     const asset::Asset asset = asset::read_asset(asset_path);
     const asset::Bounds bounds = asset::bounds(asset);
     const vec3 target =
@@ -160,9 +158,5 @@ int main(int argc, char** argv) {
         write_image(picture_path, side_by_side(result.radiance, reference, exposure_ev));
       if (!report_path.empty()) write_file(report_path, report.dump(2) + "\n");
     }
-  } catch (const Error& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -15,7 +15,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -23,6 +22,7 @@
 #include <nlohmann/json.hpp>
 
 #include "aged.h"
+#include "console/program.h"
 #include "export_scene.h"
 #include "path_replay_fit.h"
 #include "patina/asset/map_slots.h"
@@ -278,42 +278,31 @@ void run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  CLI::App program("How well and how fast inverse rendering finds known textures.", "bench_inverse");
   Options options;
-  options.recovery.resolution = 512;
-  for (int i = 1; i < argc; i += 2) {
-    const std::string flag = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
-    const int number = std::atoi(value.c_str());
-    if (flag == "--shared" && !value.empty())
-      options.shared = value;
-    else if (flag == "--out" && !value.empty())
-      options.out = value;
-    else if (flag == "--pictures" && !value.empty())
-      options.pictures = value;
-    else if (flag == "--only" && !value.empty())
-      options.only = value;
-    else if (flag == "--part" && (value == "known" || value == "aged"))
-      options.part = value;
-    else if (flag == "--resolution" && number > 0)
-      options.recovery.resolution = number;
-    else if (flag == "--samples" && number > 0)
-      options.recovery.samples_per_pixel = number;
-    else if (flag == "--iterations" && number > 0)
-      options.recovery.fit.iterations = number;
-    else {
-      std::fprintf(
-          stderr,
-          "usage: bench_inverse [--part known|aged] [--shared DIR] [--resolution 512] [--samples 128] "
-          "[--iterations 200] [--only NAME] [--out FILE] [--pictures DIR]\n");
-      return 2;
-    }
-  }
-  try {
+  test::RecoveryOptions& recovery = options.recovery;
+  recovery.resolution = 512;
+  program.add_option("--part", options.part, "What is measured")
+      ->check(CLI::IsMember({"known", "aged"}))
+      ->capture_default_str();
+  program.add_option("--shared", options.shared, "Folder of shared assets")->capture_default_str();
+  program.add_option("--resolution", recovery.resolution, "Of the views, pixels a side")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  program.add_option("--samples", recovery.samples_per_pixel, "Of the targets, paths a pixel")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  program.add_option("--iterations", recovery.fit.iterations, "Of a fit")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  program.add_option("--only", options.only, "Name of one asset, or of one ageing");
+  program.add_option("--out", options.out, "JSON to write; known assets in it are left out")
+      ->capture_default_str();
+  program.add_option("--pictures", options.pictures, "Folder of the strips")->capture_default_str();
+  return tools::run_program(program, argc, argv, [&] {
     if (options.part == "aged")
       run_aged(options);
     else
       run(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_inverse: %s\n", error.what());
-    return 1;
-  }
+  });
 }

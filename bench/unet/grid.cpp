@@ -6,11 +6,10 @@
 //
 // grid_table.py writes BIAS.safetensors, runs this beside its peer and makes the table. What the bias
 // corresponds to says how many views there are, and of what size.
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -19,6 +18,7 @@
 #include <c10/core/InferenceMode.h>
 #include <nlohmann/json.hpp>
 
+#include "console/program.h"
 #include "device_memory.h"
 #include "make_checkpoint/configs.h"
 #include "patina/base/error.h"
@@ -142,39 +142,30 @@ nlohmann::json measure(const std::vector<attention::KeyBuckets>& levels, int ste
   return result;
 }
 
-int usage() {
-  std::fprintf(stderr,
-               "usage: bench_grid BIAS.safetensors [--steps 4] [--device cpu|cuda] [--dtype bf16|f16|f32]\n");
-  return 2;
-}
+const std::map<std::string, c10::DeviceType> kDevices{{"cpu", c10::kCPU}, {"cuda", c10::kCUDA}};
+const std::map<std::string, at::ScalarType> kTypes{
+    {"bf16", at::kBFloat16}, {"f16", at::kHalf}, {"f32", at::kFloat}};
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-  std::string bias_file;
+int main(int argc, char** argv) {
+  CLI::App program("What a whole view grid costs at Stable Diffusion 1.5's full size.", "bench_grid");
+  std::string bias_file, device = "cpu", type = "bf16";
   int steps = 4;
-  nn::Placement placement(at::kBFloat16);
-  for (int i = 1; i < argc; ++i) {
-    const std::string flag = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
-    if (flag.rfind("--", 0) != 0) {
-      bias_file = flag;
-      continue;
-    }
-    ++i;
-    if (flag == "--steps")
-      steps = std::clamp(std::atoi(value.c_str()), 1, kSteps - 1);
-    else if (flag == "--device" && (value == "cpu" || value == "cuda"))
-      placement.device = value == "cpu" ? c10::kCPU : c10::kCUDA;
-    else if (flag == "--dtype" && (value == "bf16" || value == "f16" || value == "f32"))
-      placement.type = value == "bf16" ? at::kBFloat16 : value == "f16" ? at::kHalf : at::kFloat;
-    else
-      return usage();
-  }
-  if (bias_file.empty()) return usage();
-  nn::set_num_threads(0);
-  std::printf("%s\n", measure(read_bias(bias_file), steps, placement).dump(1).c_str());
-} catch (const std::exception& error) {
-  const std::string message = error.what();  // LibTorch's go on with a stack
-  std::fprintf(stderr, "bench_grid: %s\n", message.substr(0, message.find('\n')).c_str());
-  return 1;
+  program.add_option("BIAS.safetensors", bias_file, "What grid_table.py writes")->required();
+  program.add_option("--steps", steps, "Of the schedule, that are measured")
+      ->check(CLI::Range(1, kSteps - 1))
+      ->capture_default_str();
+  program.add_option("--device", device, "That computes")
+      ->check(CLI::IsMember(kDevices))
+      ->capture_default_str();
+  program.add_option("--dtype", type, "Of weights and activations")
+      ->check(CLI::IsMember(kTypes))
+      ->capture_default_str();
+  return tools::run_program(program, argc, argv, [&] {
+    nn::Placement placement(kTypes.at(type));
+    placement.device = kDevices.at(device);
+    nn::set_num_threads(0);
+    std::printf("%s\n", measure(read_bias(bias_file), steps, placement).dump(1).c_str());
+  });
 }

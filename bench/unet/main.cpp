@@ -4,7 +4,6 @@
 //   bench_unet [--out build/bench/unet.json] [--size 512] [--grid 1] [--threads N] [--f32] [--repeat 5]
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 
@@ -14,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "best_seconds.h"
+#include "console/program.h"
 #include "convolutions.h"
 #include "make_checkpoint/configs.h"
 #include "operation_times.h"
@@ -136,32 +136,27 @@ nlohmann::json measure(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  CLI::App program("Stable Diffusion 1.5's networks at full size with random weights.", "bench_unet");
   Options options;
-  int threads = 0;  // all processors
-  for (int i = 1; i < argc; ++i) {
-    const std::string flag = argv[i];
-    const auto number = [&] { return i + 1 < argc ? std::atoi(argv[++i]) : 0; };
-    if (flag == "--size")
-      options.side = number();
-    else if (flag == "--grid")
-      options.grid = number();
-    else if (flag == "--repeat")
-      options.repeat = std::max(1, number());
-    else if (flag == "--threads")
-      threads = number();
-    else if (flag == "--f32")
-      options.type = at::kFloat;
-    else if (flag == "--out" && i + 1 < argc)
-      options.out = argv[++i];
-    else {
-      std::fprintf(
-          stderr,
-          "usage: bench_unet [--size 512] [--grid 1] [--repeat 5] [--threads N] [--f32] [--out FILE]\n");
-      return 2;
-    }
-  }
-  nn::set_num_threads(threads);
-  const nlohmann::json result = measure(options);
-  std::printf("%s\n", result.dump(1).c_str());
-  if (!options.out.empty()) write_file(options.out, result.dump(1) + "\n");
+  int threads = 0;
+  bool is_f32 = false;
+  program.add_option("--size", options.side, "Pixels a side of a view")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  program.add_option("--grid", options.grid, "Views a side")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  program.add_option("--repeat", options.repeat, "Runs, of which the fastest counts")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  program.add_option("--threads", threads, "0: all processors")->capture_default_str();
+  program.add_flag("--f32", is_f32, "Instead of bf16");
+  program.add_option("--out", options.out, "JSON to write, which is printed as well");
+  return tools::run_program(program, argc, argv, [&] {
+    if (is_f32) options.type = at::kFloat;
+    nn::set_num_threads(threads);
+    const nlohmann::json result = measure(options);
+    std::printf("%s\n", result.dump(1).c_str());
+    if (!options.out.empty()) write_file(options.out, result.dump(1) + "\n");
+  });
 }

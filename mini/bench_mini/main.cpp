@@ -16,11 +16,11 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "classifier.h"
 #include "composer.h"
+#include "console/program.h"
 #include "edits_part.h"
 #include "parts.h"
 #include "patina/base/error.h"
@@ -190,7 +190,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   const char* shared = std::getenv("PATINA_SHARED");
   arguments.shared = shared ? shared : "../shared";
-  CLI::App program("Measures patina's own small model (mini/docs/measuring-mini.md).");
+  CLI::App program("Measures patina's own small model (mini/docs/measuring-mini.md).", "bench_mini");
   program.add_option("--model", arguments.model, "Diffusers folder")->capture_default_str();
   program.add_option("--shards", arguments.shards, "What make_dataset packed")->capture_default_str();
   program.add_option("--shared", arguments.shared, "Folder of shared assets (else $PATINA_SHARED)")
@@ -215,12 +215,5 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--weights", arguments.weights, "Values of w in the sweep")->capture_default_str();
   program.add_option("--threads", arguments.threads, "0: all processors")->capture_default_str();
-  CLI11_PARSE(program, argc, argv);
-  try {
-    run(arguments);
-    return 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_mini: %s\n", error.what());
-    return 1;
-  }
+  return tools::run_program(program, argc, argv, [&] { run(arguments); });
 }

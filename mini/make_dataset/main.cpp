@@ -1,11 +1,8 @@
 // make_dataset: makes the data that patina-mini is trained on. See mini/docs/dataset.md.
-#include <charconv>
 #include <cstdio>
-#include <exception>
-#include <string>
-#include <vector>
 
 #include "console/console_progress.h"
+#include "console/program.h"
 #include "materials.h"
 #include "objects.h"
 #include "pack.h"
@@ -14,94 +11,69 @@
 namespace {
 
 using namespace patina;
+using namespace patina::make_dataset;
 namespace fs = std::filesystem;
 
-constexpr const char* kUsage =
-    "usage: make_dataset objects --shared SHARED --count N [--quick] WORK  bake N objects of four "
-    "views (resumable); quick: a quarter of the rays\n"
-    "       make_dataset materials --shared SHARED [--limit N] WORK  pack photographed materials\n"
-    "       make_dataset pack WORK SHARDS                            gather both into a few shards\n"
-    "       make_dataset preview SHARDS -o SHEET.png [--seed N] [--rows N] [--width N]\n"
-    "                    [--only NAME] [--held-out]                  look at samples; captions in "
-    "SHEET.png.txt\n";
-
 struct Arguments {
-  std::vector<std::string> positional;
-  fs::path shared, output;
-  std::string only;
-  int count = 80, limit = 16, rows = 8, width = 160;
-  int64_t seed = 0;
-  bool quick = false, held_out = false, good = true;
+  fs::path shared, work, shards, sheet;
+  int num_objects = 80, materials_a_class = 16;
+  bool quick = false;
+  PreviewOptions preview;
 };
 
-Arguments parsed(int argc, char** argv) {
-  Arguments out;
-  for (int i = 2; i < argc; ++i) {
-    const std::string word = argv[i];
-    const auto value = [&]() -> std::string {
-      if (i + 1 < argc) return argv[++i];
-      out.good = false;
-      return "";
-    };
-    const auto number = [&](auto& into) {
-      const std::string text = value();
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), into);
-      if (error != std::errc() || end != text.data() + text.size() || into < 0) out.good = false;
-    };
-    if (word == "--shared")
-      out.shared = value();
-    else if (word == "-o")
-      out.output = value();
-    else if (word == "--only")
-      out.only = value();
-    else if (word == "--quick")
-      out.quick = true;
-    else if (word == "--held-out")
-      out.held_out = true;
-    else if (word == "--count")
-      number(out.count);
-    else if (word == "--limit")
-      number(out.limit);
-    else if (word == "--rows")
-      number(out.rows);
-    else if (word == "--width")
-      number(out.width);
-    else if (word == "--seed")
-      number(out.seed);
-    else if (word.rfind("-", 0) == 0)
-      out.good = false;
-    else
-      out.positional.push_back(word);
-  }
-  return out;
+void add_makers(CLI::App& program, Arguments& a) {
+  CLI::App& objects = *program.add_subcommand("objects", "Bake objects of four views (resumable)");
+  objects.add_option("--shared", a.shared, "Folder of shared assets")->required();
+  objects.add_option("--count", a.num_objects, "Objects")->check(CLI::PositiveNumber)->capture_default_str();
+  objects.add_flag("--quick", a.quick, "A quarter of the rays");
+  objects.add_option("WORK", a.work, "Folder that gets them")->required();
+  objects.callback([&a] {
+    bake_objects(object_plans(a.num_objects), a.shared, a.work / "objects", a.quick,
+                 tools::console_progress());
+  });
+
+  CLI::App& materials = *program.add_subcommand("materials", "Pack photographed materials");
+  materials.add_option("--shared", a.shared, "Folder of shared assets")->required();
+  materials.add_option("--limit", a.materials_a_class, "Of each class")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  materials.add_option("WORK", a.work, "Folder that gets materials.shard")->required();
+  materials.callback([&a] {
+    mini_data::write_shard(
+        a.work / "materials.shard",
+        material_entries(a.shared / "materials", a.materials_a_class, tools::console_progress()));
+  });
+
+  CLI::App& packing = *program.add_subcommand("pack", "Gather both into a few shards");
+  packing.add_option("WORK", a.work, "Folder of objects and materials")->required();
+  packing.add_option("SHARDS", a.shards, "Folder that gets the shards")->required();
+  packing.callback([&a] { std::fputs(pack(a.work, a.shards).c_str(), stdout); });
+}
+
+void add_preview(CLI::App& program, Arguments& a) {
+  CLI::App& preview =
+      *program.add_subcommand("preview", "A picture of samples; their captions lie beside it as .txt");
+  preview.add_option("SHARDS", a.shards, "Folder of shards")->required();
+  preview.add_option("-o", a.sheet, "PNG to write")->required();
+  preview.add_option("--seed", a.preview.seed, "Of the samples")->check(CLI::NonNegativeNumber);
+  preview.add_option("--rows", a.preview.rows, "Of three samples each")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  preview.add_option("--width", a.preview.tile_width, "Of a picture, pixels")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  preview.add_option("--only", a.preview.only, "One kind of ageing or clean material");
+  preview.add_flag("--held-out", a.preview.held_out, "Samples that no training sees");
+  preview.callback([&a] { write_preview(a.shards, a.sheet, a.preview); });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  using namespace patina::make_dataset;
-  try {
-    const std::string command = argc > 1 ? argv[1] : "";
-    const Arguments a = parsed(argc, argv);
-    const auto has = [&](size_t n) { return a.good && a.positional.size() == n; };
-    if (command == "objects" && has(1)) {
-      bake_objects(object_plans(a.count), a.shared, fs::path(a.positional[0]) / "objects", a.quick,
-                   tools::console_progress());
-    } else if (command == "materials" && has(1) && !a.shared.empty()) {
-      const auto entries = material_entries(a.shared / "materials", a.limit, tools::console_progress());
-      mini_data::write_shard(fs::path(a.positional[0]) / "materials.shard", entries);
-    } else if (command == "pack" && has(2)) {
-      std::fputs(pack(a.positional[0], a.positional[1]).c_str(), stdout);
-    } else if (command == "preview" && has(1) && !a.output.empty()) {
-      write_preview(a.positional[0], a.output,
-                    {static_cast<uint64_t>(a.seed), a.rows, a.held_out, a.only, a.width});
-    } else {
-      std::fputs(kUsage, stderr);
-      return 2;
-    }
-    return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "\nmake_dataset: %s\n", e.what());
-    return 1;
-  }
+  CLI::App program("Makes the data that patina-mini is trained on (mini/docs/dataset.md).", "make_dataset");
+  program.require_subcommand(1);
+  Arguments arguments;
+  add_makers(program, arguments);
+  add_preview(program, arguments);
+  return tools::run_program(program, argc, argv);
 }

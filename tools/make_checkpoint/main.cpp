@@ -1,10 +1,8 @@
 // make_checkpoint: a Stable Diffusion checkpoint of random weights, as a single file, a diffusers folder, a
 // ControlNet, a VAE or a LoRA, for testing and measuring at the real size without anybody's weights.
-#include <cstdio>
 #include <map>
 
-#include <CLI/CLI.hpp>
-
+#include "console/program.h"
 #include "make_checkpoint/checkpoint.h"
 #include "patina/base/error.h"
 
@@ -55,15 +53,8 @@ int main(int argc, char** argv) {
   program.add_option("--variant", folder.variant, "In the names of weight files (diffusers), such as fp16.");
   program.add_option("--tokenizer", folder.tokenizer, "Folder to copy into the model (diffusers).");
   program.add_flag("--empty", model.empty, "Zeros that take no place on disk.");
-  try {
-    program.parse(argc, argv);
+  return tools::run_program(program, argc, argv, [&] {
     model.configs = configs_of(family, size, vocabulary);
     write(layout, out, model, folder);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    return program.exit(error);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "make_checkpoint: %s\n", error.what());
-    return 1;
-  }
+  });
 }

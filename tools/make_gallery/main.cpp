@@ -4,13 +4,13 @@
 //   make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] [--only NAME|OPTION]
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "console/console_progress.h"
+#include "console/program.h"
 #include "option_sheet.h"
 #include "patina/asset/asset.h"
 #include "patina/base/files.h"
@@ -154,28 +154,14 @@ void make(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  CLI::App program("Makes the pictures of docs/gallery.md and the page. Goes on where it was stopped.",
+                   "make_gallery");
   Arguments arguments;
-  const std::map<std::string, fs::path*> paths{{"--model", &arguments.model},
-                                               {"--shared", &arguments.shared},
-                                               {"--work", &arguments.work},
-                                               {"--docs", &arguments.docs}};
-  for (int i = 1; i < argc; i += 2) {
-    const auto path = paths.find(argv[i]);
-    if (i + 1 < argc && path != paths.end()) {
-      *path->second = argv[i + 1];
-    } else if (i + 1 < argc && std::string(argv[i]) == "--only") {
-      arguments.only = argv[i + 1];
-    } else {
-      std::fprintf(stderr,
-                   "usage: make_gallery [--model DIR] [--shared DIR] [--work DIR] [--docs DIR] "
-                   "[--only NAME|OPTION]\n");
-      return 2;
-    }
-  }
-  try {
-    make(arguments);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "make_gallery: %s\n", error.what());
-    return 1;
-  }
+  program.add_option("--model", arguments.model, "Diffusers folder")->capture_default_str();
+  program.add_option("--shared", arguments.shared, "Folder of shared assets")->capture_default_str();
+  program.add_option("--work", arguments.work, "Folder of the runs")->capture_default_str();
+  program.add_option("--docs", arguments.docs, "Folder that gets page and pictures")->capture_default_str();
+  program.add_option("--only", arguments.only,
+                     "Name of one picture, or an option of which the values are shown");
+  return tools::run_program(program, argc, argv, [&] { make(arguments); });
 }

@@ -1,16 +1,15 @@
 // golden_check MODEL_DIR GOLDEN_DIR: compares a model folder in the diffusers layout with stored inputs and
-// outputs of the reference implementation, file by file. Exit code 0: all within their limits; 1: some are
-// not; 2: could not run.
+// outputs of the reference implementation, file by file. Exit code 0: all are within their limits.
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 
+#include "console/program.h"
 #include "dev/golden/golden.h"
 #include "patina/base/error.h"
 
 namespace {
 
-int run(const std::filesystem::path& model, const std::filesystem::path& golden) {
+void run(const std::filesystem::path& model, const std::filesystem::path& golden) {
   using namespace patina::diffusion;
   if (!std::filesystem::is_directory(model)) {
     throw patina::Error(patina::ErrorCode::kNotFound, model.string(),
@@ -35,23 +34,18 @@ int run(const std::filesystem::path& model, const std::filesystem::path& golden)
     std::fflush(stdout);
   }
   std::printf("%zu of %zu files within their limits\n", files.size() - num_failed, files.size());
-  return num_failed == 0 ? 0 : 1;
+  if (num_failed > 0)
+    throw patina::Error(patina::ErrorCode::kFormat, golden.string(),
+                        "holds results from which the networks of " + model.string() + " differ");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fprintf(stderr,
-                 "usage: golden_check MODEL_DIR GOLDEN_DIR\n"
-                 "  MODEL_DIR   a model folder in the diffusers layout\n"
-                 "  GOLDEN_DIR  stored inputs and outputs of the reference implementation for that model\n");
-    return 2;
-  }
-  try {
-    return run(argv[1], argv[2]);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "golden_check: %s\n", error.what());
-    return 2;
-  }
+  CLI::App program("Compares a model's networks with stored results of the reference implementation.",
+                   "golden_check");
+  std::filesystem::path model, golden;
+  program.add_option("MODEL_DIR", model, "Model folder in the diffusers layout")->required();
+  program.add_option("GOLDEN_DIR", golden, "Stored inputs and outputs for that model")->required();
+  return patina::tools::run_program(program, argc, argv, [&] { run(model, golden); });
 }
