@@ -33,7 +33,8 @@ void add_option(CLI::App& command, const pipeline::Option& option, GivenOptions&
   if (option.is_flag()) {
     item.cli = command.add_flag(names, help);
   } else if (option.is_list) {
-    item.cli = command.add_option(names, item.values, help)->type_name(option.placeholder + " ...");
+    item.cli =
+        command.add_option(names, item.values, help)->type_name(option.placeholder);  // CLI11 adds "..."
   } else {
     item.cli = command.add_option(names, help)->type_name(option.placeholder)->expected(1);
   }

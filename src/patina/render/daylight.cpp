@@ -1,25 +1,6 @@
 #include "patina/render/daylight.h"
 
 namespace patina::render {
-namespace {
-
-// A map of `light`, radiance by unit direction.
-template <class Light>
-Environment environment_of(const Light& light) {
-  constexpr int kWidth = 512, kHeight = 256;
-  Image map(kWidth, kHeight, 3);
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) {
-      const float polar = kPi * (static_cast<float>(y) + 0.5f) / kHeight;
-      const float azimuth = 2.0f * kPi * ((static_cast<float>(x) + 0.5f) / kWidth - 0.5f);
-      map.set_rgb(x, y,
-                  light(vec3(std::sin(polar) * std::cos(azimuth), std::cos(polar),
-                             std::sin(polar) * std::sin(azimuth))));
-    }
-  return Environment(std::move(map));
-}
-
-}  // namespace
 
 Environment overcast_environment() {
   return environment_of([](const vec3& direction) {

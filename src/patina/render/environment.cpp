@@ -202,6 +202,20 @@ Environment::Sample Environment::sample(const vec2& u) const {
   return {direction, radiance(direction), texels_[y * columns + static_cast<size_t>(column.index)].w};
 }
 
+Environment environment_of(const std::function<vec3(const vec3&)>& light) {
+  constexpr int kWidth = 512, kHeight = 256;
+  Image map(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const float polar = kPi * (static_cast<float>(y) + 0.5f) / kHeight;
+      const float azimuth = 2.0f * kPi * ((static_cast<float>(x) + 0.5f) / kWidth - 0.5f);
+      map.set_rgb(x, y,
+                  light(vec3(std::sin(polar) * std::cos(azimuth), std::cos(polar),
+                             std::sin(polar) * std::sin(azimuth))));
+    }
+  return Environment(std::move(map));
+}
+
 Environment constant_environment(const vec3& radiance) {
   Image map(1, 1, 3);
   map.set_rgb(0, 0, radiance);

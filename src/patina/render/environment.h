@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "patina/image/image.h"
@@ -50,6 +51,8 @@ class Environment {
   float mean_radiance_ = 0;
 };
 
+/// A map of `light`, radiance by unit direction: for lights that are made by formula.
+Environment environment_of(const std::function<vec3(const vec3&)>& light);
 /// The built-in studio: soft key, fill and rim boxes over a grey dome, lit for materials; made by formula, so
 /// no file is needed.
 Environment studio_environment();

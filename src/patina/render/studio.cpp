@@ -38,21 +38,13 @@ Environment studio_environment() {
       {160.0f, 30.0f, 0.28f, 0.75f, 0.05f, 9.0f * vec3(0.97f, 0.98f, 1.0f)},  // rim: behind right, tall
       {-140.0f, 35.0f, 0.22f, 0.60f, 0.05f, 6.0f * vec3(1.0f, 0.97f, 0.93f)},  // second rim: behind left
   };
-  constexpr int kWidth = 512, kHeight = 256;
-  Image map(kWidth, kHeight, 3);
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) {
-      const float polar = kPi * (static_cast<float>(y) + 0.5f) / kHeight;
-      const float azimuth = 2.0f * kPi * ((static_cast<float>(x) + 0.5f) / kWidth - 0.5f);
-      const vec3 direction(std::sin(polar) * std::cos(azimuth), std::cos(polar),
-                           std::sin(polar) * std::sin(azimuth));
-      const float height = 0.5f + 0.5f * direction.y;
-      vec3 light = glm::mix(vec3(0.22f, 0.21f, 0.20f), vec3(0.62f, 0.64f, 0.67f),
-                            glm::smoothstep(0.15f, 0.95f, height));
-      for (const SoftBox& box : boxes) light += light_of(box, direction);
-      map.set_rgb(x, y, light);
-    }
-  return Environment(std::move(map));
+  return environment_of([&](const vec3& direction) {
+    const float height = 0.5f + 0.5f * direction.y;
+    vec3 light =
+        glm::mix(vec3(0.22f, 0.21f, 0.20f), vec3(0.62f, 0.64f, 0.67f), glm::smoothstep(0.15f, 0.95f, height));
+    for (const SoftBox& box : boxes) light += light_of(box, direction);
+    return light;
+  });
 }
 
 }  // namespace patina::render
