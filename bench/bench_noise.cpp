@@ -15,6 +15,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "console/numbers.h"
 #include "console/program.h"
 #include "noise_measure.h"
 #include "noise_picture.h"
@@ -232,14 +233,16 @@ int main(int argc, char** argv) {
   std::vector<std::string> pictured;
   program.add_option("--out", out, "JSON to write")->capture_default_str();
   program.add_option("--only", only, "Assets whose path holds this text");
-  program.add_option("--seeds", num_seeds, "Of an asset")->check(CLI::PositiveNumber)->capture_default_str();
+  program.add_option("--seeds", num_seeds, "Of an asset")
+      ->check(tools::whole_number(1))
+      ->capture_default_str();
   CLI::Option* sweep_option =
       program.add_option("--sweep", swept, "ASSET: share of the bound against samples a latent pixel");
   program.add_option("--picture", pictured, "ASSET OUT.png: the noise of two neighbouring views")
       ->expected(2)
       ->excludes(sweep_option);
   program.add_option("--views", num_views, "Of a turn, in the picture")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   return tools::run_program(program, argc, argv, [&] {
     if (!swept.empty()) return sweep(swept);

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "console/numbers.h"
 #include "console/program.h"
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
@@ -98,14 +99,16 @@ int main(int argc, char** argv) {
   app.add_option("out", out_path, "EXR (linear) or PNG (sRGB) to write")->required();
   app.add_option("--environment", environment_path, "equirectangular HDR; default: the built-in studio");
   app.add_option("--eye", eye_values, "world position of the camera, metres; default: in front, all in view")
-      ->expected(3);
+      ->expected(3)
+      ->check(tools::number());
   app.add_option("--target", target_values, "world position it looks at; default: the centre of the bounds")
-      ->expected(3);
-  app.add_option("--fov", fov_degrees, "vertical field of view, degrees");
-  app.add_option("--size", size, "pixels a side");
-  app.add_option("--samples", samples, "paths a pixel");
-  app.add_option("--depth", depth, "path segments after the camera ray");
-  app.add_option("--exposure", exposure_ev, "of PNG files, stops");
+      ->expected(3)
+      ->check(tools::number());
+  app.add_option("--fov", fov_degrees, "vertical field of view, degrees")->check(tools::positive_number());
+  app.add_option("--size", size, "pixels a side")->check(tools::whole_number(1));
+  app.add_option("--samples", samples, "paths a pixel")->check(tools::whole_number(1));
+  app.add_option("--depth", depth, "path segments after the camera ray")->check(tools::whole_number(1));
+  app.add_option("--exposure", exposure_ev, "of PNG files, stops")->check(tools::number());
   app.add_flag("--show-environment", show_environment, "show the environment behind the asset");
   app.add_flag("--principled", principled, "Burley's principled model instead of glTF's");
   app.add_option("--reference", reference_path, "EXR of the same view and size to compare with");

@@ -27,8 +27,7 @@ void add_show_attention(CLI::App& program) {
                                              "Show what one surface point attends to in the U-Net, without "
                                              "and with the attention bias, over the view grid.");
   struct Own {
-    std::string output, layer;
-    int step = 0;
+    std::string output, layer, step;
   };
   const auto own = std::make_shared<Own>();
   command->add_option("-o,--output", own->output, "A page with the numbers (.html) or one picture (.png).")
@@ -43,10 +42,9 @@ void add_show_attention(CLI::App& program) {
           "[the last of the finest]")
       ->type_name("NAME")
       ->group("What is shown");
-  CLI::Option* const step =
-      command->add_option("--step", own->step, "Which evaluation of the network, from 1. [the middle one]")
-          ->type_name("K")
-          ->group("What is shown");
+  command->add_option("--step", own->step, "Which evaluation of the network, from 1. [the middle one]")
+      ->type_name("K")
+      ->group("What is shown");
   using namespace pipeline;
   const auto given = add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.",
                                  kInputs | kRender | kEdit | kMachine, {"material"});
@@ -63,9 +61,7 @@ void add_show_attention(CLI::App& program) {
     pipeline::AttentionOptions options;
     options.layer = own->layer;
     options.point = point->options();
-    if (step->count() > 0 && own->step < 1)
-      throw Error(ErrorCode::kUsage, "step", fmt::format("expected 1 or more, found {}", own->step));
-    options.evaluation = own->step;
+    if (!own->step.empty()) options.evaluation = parse_count("step", own->step);
 
     const std::filesystem::path output = own->output;
     if (config.run.empty()) config.run = output.parent_path() / (output.stem().string() + ".patina-run");

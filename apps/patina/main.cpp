@@ -4,6 +4,7 @@
 #include <fcntl.h>
 
 #include <cstdio>
+#include <memory>
 #include <new>
 #include <string>
 #include <string_view>
@@ -11,9 +12,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "commands.h"
 #include "console.h"
 #include "patina/base/error.h"
+#include "program.h"
 #include "usage.h"
 #include "wait_policy.h"
 
@@ -70,41 +71,26 @@ int main(int argc, char** argv) {
   const std::string_view command = argc > 1 ? argv[1] : "";
   if (command == "enhance" || command == "detail" || command == "ablate" || command == "show-attention")
     patina::app::sleep_between_parallel_regions(argv);
-  CLI::App program(
-      "patina adds generated detail (rust, moss, wear, dust, age) to the material of an existing 3D asset.\n"
-      "Mesh, UVs and file structure stay; base colour, normal and roughness textures change.\n\n"
-      "  patina enhance kettle.glb --prompt \"a rusty old kettle\" --model DIR -o rusty.glb",
-      "patina");
-  program.require_subcommand(1);
-  program.set_version_flag("--version", "patina " PATINA_VERSION);
-  patina::app::add_enhance(program);
-  patina::app::add_render(program);
-  patina::app::add_detail(program);
-  patina::app::add_fit(program);
-  patina::app::add_report(program);
-  patina::app::add_ablate(program);
-  patina::app::add_show_attention(program);
-  patina::app::add_info(program);
-  patina::app::add_models(program);
-
+  const std::unique_ptr<CLI::App> program = patina::app::make_program();
   patina::app::install_stop_handler();
   const bool as_event = asks_for_events(argc, argv);
   const auto fault = [&](const char* what, const char* hint) {
     return fail(1, "fault", "", patina::printable(what, 2000) + hint, as_event);
   };
   try {
-    program.parse(argc, argv);
+    program->parse(argc, argv);
     if (std::fflush(stdout) != 0) return fail(1, "io", "", "standard output cannot be written", as_event);
     return 0;
   } catch (const CLI::Success& e) {  // --help, --version
-    return program.exit(e);
+    return program->exit(e);
   } catch (const CLI::ParseError& e) {
-    const std::string text = patina::app::about_unexpected(program, argc, argv, e.what());
+    const std::string text = patina::app::about_unexpected(*program, argc, argv, e.what());
     return fail(2, "usage", "",
                 patina::printable(text, 2000) + "\nTry `patina --help` or `patina COMMAND --help`.",
                 as_event);
   } catch (const patina::Error& e) {
-    const std::string context = patina::app::context_at_command_line(e, patina::app::chosen_command(program));
+    const std::string context =
+        patina::app::context_at_command_line(e, patina::app::chosen_command(*program));
     return fail(exit_code_of(e.code()), patina::app::name_of(e.code()), patina::printable(context, 500),
                 patina::printable(e.message(), 2000), as_event);
   } catch (const std::bad_alloc&) {

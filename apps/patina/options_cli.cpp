@@ -9,6 +9,7 @@
 #include "bundled_model.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/pipeline/options.h"
 
 namespace patina::app {
@@ -16,10 +17,13 @@ namespace {
 
 // "-p,--prompt", but "--guidance-scale,--cfg-scale".
 std::string all_names(const pipeline::Option& option) {
-  std::string names = "--" + option.name;
+  std::string short_names, long_names = "--" + option.name;
   for (const std::string& alias : option.aliases)
-    names = alias.starts_with("--") ? names + "," + alias : alias + "," + names;
-  return names;
+    if (alias.starts_with("--"))
+      long_names.append(",").append(alias);
+    else
+      short_names.append(alias).append(",");
+  return short_names + long_names;
 }
 
 // Values stay text here: the pipeline's list parses them, the same way wherever they come from.
@@ -123,6 +127,13 @@ void find_positional(GivenOptions& given) {
     return;
   }
   throw Error(ErrorCode::kUsage, given.positional_name, "is missing; give it first, before all options");
+}
+
+int parse_count(const std::string& setting, const std::string& text) {
+  const auto count = parse_number<int>(text);
+  if (count && *count >= 1) return *count;
+  throw Error(ErrorCode::kUsage, setting,
+              fmt::format("expected a whole number of 1 or more, found '{}'", printable(text)));
 }
 
 void require_prompt(const pipeline::Config& config) {

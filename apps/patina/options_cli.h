@@ -43,6 +43,9 @@ void apply_options(const GivenOptions& given, pipeline::Config& config);
 /// Throws Error{kUsage} where it is missing. To be called before apply_options.
 void find_positional(GivenOptions& given);
 
+/// A whole number of 1 or more for a setting that is not in the pipeline's list. Throws Error{kUsage}.
+int parse_count(const std::string& setting, const std::string& text);
+
 /// Throws Error{kUsage} unless there is a prompt.
 void require_prompt(const pipeline::Config& config);
 

@@ -12,11 +12,9 @@ namespace patina::app {
 
 /// What a command was given. Lives as long as the command is parsed.
 struct GivenPoint {
-  CLI::Option* view_option = nullptr;
-  int view = 0;
-  std::string pixel;
+  std::string view, pixel;
 
-  /// Throws Error{kUsage} for a pixel that is not written as "120,64".
+  /// Throws Error{kUsage} for a view that is no number and a pixel that is not written as "120,64".
   pipeline::PointOptions options() const;
 };
 

@@ -22,6 +22,7 @@
 #include <nlohmann/json.hpp>
 
 #include "aged.h"
+#include "console/numbers.h"
 #include "console/program.h"
 #include "export_scene.h"
 #include "path_replay_fit.h"
@@ -221,6 +222,17 @@ void run_aged(const Options& options) {
   write_file(options.out, all.dump(1) + "\n");
 }
 
+// Throws where `only` is given and none of the assets.
+void require_asset(const std::string& only) {
+  std::string names;
+  for (const char* file : kAssets) {
+    const std::string name = fs::path(file).stem().string();
+    if (only.empty() || only == name) return;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  throw std::runtime_error("no asset is called " + only + "; there are " + names);
+}
+
 void run(const Options& options) {
   const json settings{{"resolution", options.recovery.resolution},
                       {"samples", options.recovery.samples_per_pixel},
@@ -229,6 +241,7 @@ void run(const Options& options) {
   if (fs::exists(options.out)) report = json::parse(read_text_file(options.out));
   if (report.value("settings", json()) != settings)
     report = {{"settings", settings}, {"assets", json::array()}};
+  require_asset(options.only);
 
   for (const char* file : kAssets) {
     const std::string name = fs::path(file).stem().string();
@@ -287,13 +300,13 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--shared", options.shared, "Folder of shared assets")->capture_default_str();
   program.add_option("--resolution", recovery.resolution, "Of the views, pixels a side")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   program.add_option("--samples", recovery.samples_per_pixel, "Of the targets, paths a pixel")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   program.add_option("--iterations", recovery.fit.iterations, "Of a fit")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   program.add_option("--only", options.only, "Name of one asset, or of one ageing");
   program.add_option("--out", options.out, "JSON to write; known assets in it are left out")

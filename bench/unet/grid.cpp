@@ -18,6 +18,7 @@
 #include <c10/core/InferenceMode.h>
 #include <nlohmann/json.hpp>
 
+#include "console/numbers.h"
 #include "console/program.h"
 #include "device_memory.h"
 #include "make_checkpoint/configs.h"
@@ -154,7 +155,7 @@ int main(int argc, char** argv) {
   int steps = 4;
   program.add_option("BIAS.safetensors", bias_file, "What grid_table.py writes")->required();
   program.add_option("--steps", steps, "Of the schedule, that are measured")
-      ->check(CLI::Range(1, kSteps - 1))
+      ->check(tools::whole_number(1, kSteps - 1))
       ->capture_default_str();
   program.add_option("--device", device, "That computes")
       ->check(CLI::IsMember(kDevices))

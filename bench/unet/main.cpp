@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "best_seconds.h"
+#include "console/numbers.h"
 #include "console/program.h"
 #include "convolutions.h"
 #include "make_checkpoint/configs.h"
@@ -141,15 +142,17 @@ int main(int argc, char** argv) {
   int threads = 0;
   bool is_f32 = false;
   program.add_option("--size", options.side, "Pixels a side of a view")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   program.add_option("--grid", options.grid, "Views a side")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   program.add_option("--repeat", options.repeat, "Runs, of which the fastest counts")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
-  program.add_option("--threads", threads, "0: all processors")->capture_default_str();
+  program.add_option("--threads", threads, "0: all processors")
+      ->check(tools::whole_number(0))
+      ->capture_default_str();
   program.add_flag("--f32", is_f32, "Instead of bf16");
   program.add_option("--out", options.out, "JSON to write, which is printed as well");
   return tools::run_program(program, argc, argv, [&] {

@@ -20,6 +20,7 @@
 
 #include "classifier.h"
 #include "composer.h"
+#include "console/numbers.h"
 #include "console/program.h"
 #include "edits_part.h"
 #include "parts.h"
@@ -199,21 +200,32 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--only", arguments.only, "Parts to measure")->check(CLI::IsMember(kParts));
   program.add_option("--demo", arguments.demo, "Command line whose wall clock is demo_seconds");
-  program.add_option("--views", arguments.views, "Views of each edit with a prompt")->capture_default_str();
-  program.add_option("--ablation-views", arguments.ablation_views, "Views of the ablation and the sweep")
+  program.add_option("--views", arguments.views, "Views of each edit with a prompt")
+      ->check(tools::whole_number(1))
       ->capture_default_str();
-  program.add_option("--steps", arguments.steps, "Steps of every edit")->capture_default_str();
+  program.add_option("--ablation-views", arguments.ablation_views, "Views of the ablation and the sweep")
+      ->check(tools::whole_number(1))
+      ->capture_default_str();
+  program.add_option("--steps", arguments.steps, "Steps of every edit")
+      ->check(tools::whole_number(1))
+      ->capture_default_str();
   program
       .add_option("--guidance-scale", arguments.guidance_scale, "Of every edit; 0 is what suits the model")
+      ->check(tools::number())
       ->capture_default_str();
   program.add_option("--negative-prompt", arguments.negative_prompt,
                      "Of every edit, in place of the model's own");
   program.add_option("--fine-detail", arguments.fine_detail, "Of every edit, as of patina enhance")
+      ->check(tools::number())
       ->capture_default_str();
   program.add_option("--assets", arguments.num_assets, "How many of the five assets, for a quick look")
-      ->check(CLI::Range(1, 5))
+      ->check(tools::whole_number(1, 5))
       ->capture_default_str();
-  program.add_option("--weights", arguments.weights, "Values of w in the sweep")->capture_default_str();
-  program.add_option("--threads", arguments.threads, "0: all processors")->capture_default_str();
+  program.add_option("--weights", arguments.weights, "Values of w in the sweep")
+      ->check(tools::number())
+      ->capture_default_str();
+  program.add_option("--threads", arguments.threads, "0: all processors")
+      ->check(tools::whole_number(0))
+      ->capture_default_str();
   return tools::run_program(program, argc, argv, [&] { run(arguments); });
 }

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "console/console_progress.h"
+#include "console/numbers.h"
 #include "console/program.h"
 #include "materials.h"
 #include "objects.h"
@@ -24,7 +25,9 @@ struct Arguments {
 void add_makers(CLI::App& program, Arguments& a) {
   CLI::App& objects = *program.add_subcommand("objects", "Bake objects of four views (resumable)");
   objects.add_option("--shared", a.shared, "Folder of shared assets")->required();
-  objects.add_option("--count", a.num_objects, "Objects")->check(CLI::PositiveNumber)->capture_default_str();
+  objects.add_option("--count", a.num_objects, "Objects")
+      ->check(tools::whole_number(1))
+      ->capture_default_str();
   objects.add_flag("--quick", a.quick, "A quarter of the rays");
   objects.add_option("WORK", a.work, "Folder that gets them")->required();
   objects.callback([&a] {
@@ -35,7 +38,7 @@ void add_makers(CLI::App& program, Arguments& a) {
   CLI::App& materials = *program.add_subcommand("materials", "Pack photographed materials");
   materials.add_option("--shared", a.shared, "Folder of shared assets")->required();
   materials.add_option("--limit", a.materials_a_class, "Of each class")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   materials.add_option("WORK", a.work, "Folder that gets materials.shard")->required();
   materials.callback([&a] {
@@ -55,12 +58,12 @@ void add_preview(CLI::App& program, Arguments& a) {
       *program.add_subcommand("preview", "A picture of samples; their captions lie beside it as .txt");
   preview.add_option("SHARDS", a.shards, "Folder of shards")->required();
   preview.add_option("-o", a.sheet, "PNG to write")->required();
-  preview.add_option("--seed", a.preview.seed, "Of the samples")->check(CLI::NonNegativeNumber);
+  preview.add_option("--seed", a.preview.seed, "Of the samples")->check(tools::whole_number(0));
   preview.add_option("--rows", a.preview.rows, "Of three samples each")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   preview.add_option("--width", a.preview.tile_width, "Of a picture, pixels")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   preview.add_option("--only", a.preview.only, "One kind of ageing or clean material");
   preview.add_flag("--held-out", a.preview.held_out, "Samples that no training sees");

@@ -6,6 +6,7 @@
 #include <ATen/ATen.h>
 
 #include "console/console_progress.h"
+#include "console/numbers.h"
 #include "console/program.h"
 #include "evaluation.h"
 #include "patina/diffusion/networks/vae.h"
@@ -63,14 +64,14 @@ void print_evaluation(const Arguments& a) {
 }
 
 CLI::Option* add_count(CLI::App& command, int64_t& count, const char* help) {
-  return command.add_option("--count", count, help)->check(CLI::PositiveNumber)->capture_default_str();
+  return command.add_option("--count", count, help)->check(tools::whole_number(1))->capture_default_str();
 }
 void add_folders(CLI::App& command, Arguments& a) {
   command.add_option("WORK", a.work, "Folder of the samples and of the training's state")->required();
   command.add_option("MODEL", a.model, "Folder with config.json; gets material.safetensors")->required();
 }
 void add_seed(CLI::App& command, Arguments& a) {
-  command.add_option("--seed", a.training.run.seed, "Of all that is random")->check(CLI::NonNegativeNumber);
+  command.add_option("--seed", a.training.run.seed, "Of all that is random")->check(tools::whole_number(0));
 }
 
 void add_samples(CLI::App& program, Arguments& a) {
@@ -89,11 +90,15 @@ void add_train(CLI::App& program, Arguments& a) {
   CLI::App& command = *program.add_subcommand("train", "Train");
   add_folders(command, a);
   train_mini::RunOptions& run = a.training.run;
-  command.add_option("--minutes", run.minutes, "How long")->check(CLI::PositiveNumber)->capture_default_str();
-  command.add_option("--rate", run.rate, "Of learning")->check(CLI::PositiveNumber)->capture_default_str();
+  command.add_option("--minutes", run.minutes, "How long")
+      ->check(tools::positive_number())
+      ->capture_default_str();
+  command.add_option("--rate", run.rate, "Of learning")
+      ->check(tools::positive_number())
+      ->capture_default_str();
   command.add_flag("--settle", run.settle, "The rate falls to zero");
   command.add_option("--batch", a.training.batch, "Samples a step")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   command.add_flag("--from-model", a.training.from_model, "Begin with the weights that MODEL has");
   add_seed(command, a);

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "console/console_progress.h"
+#include "console/numbers.h"
 #include "console/program.h"
 #include "denoiser_training.h"
 #include "mini_data/plan.h"
@@ -83,7 +84,7 @@ void add_folders(CLI::App& command, Arguments& a) {
       ->required();
 }
 void add_seed(CLI::App& command, Arguments& a) {
-  command.add_option("--seed", a.run.seed, "Of all that is random")->check(CLI::NonNegativeNumber);
+  command.add_option("--seed", a.run.seed, "Of all that is random")->check(tools::whole_number(0));
 }
 void add_device(CLI::App& command, Arguments& a) {
   command.add_flag("--cuda", a.cuda, "On the GPU");
@@ -91,15 +92,17 @@ void add_device(CLI::App& command, Arguments& a) {
 void add_training(CLI::App& command, Arguments& a) {
   add_folders(command, a);
   command.add_option("--minutes", a.run.minutes, "How long")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::positive_number())
       ->capture_default_str();
-  command.add_option("--rate", a.run.rate, "Of learning")->check(CLI::PositiveNumber)->capture_default_str();
+  command.add_option("--rate", a.run.rate, "Of learning")
+      ->check(tools::positive_number())
+      ->capture_default_str();
   command.add_flag("--settle", a.run.settle, "The rate falls to zero");
   add_seed(command, a);
 }
 void add_batch(CLI::App& command, Arguments& a) {
   command.add_option("--batch", a.batch, "Samples a step; the training's own if it is not given")
-      ->check(CLI::PositiveNumber);
+      ->check(tools::whole_number(1));
   add_device(command, a);
 }
 
@@ -109,7 +112,7 @@ void add_data_commands(CLI::App& program, Arguments& a) {
   samples.add_option("SHARDS", a.shards, "What make_dataset packed")->required();
   samples.add_option("WORK", a.work, "Folder that gets them")->required();
   samples.add_option("--count", a.num_samples, "Training samples")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   add_seed(samples, a);
   add_device(samples, a);
@@ -118,7 +121,7 @@ void add_data_commands(CLI::App& program, Arguments& a) {
   CLI::App& captions = *program.add_subcommand("captions", "Print captions, for the tokenizer");
   captions.add_option("SHARDS", a.shards, "What make_dataset packed")->required();
   captions.add_option("--count", a.num_captions, "How many")
-      ->check(CLI::PositiveNumber)
+      ->check(tools::whole_number(1))
       ->capture_default_str();
   captions.callback([&a] { print_captions(a); });
 
@@ -150,7 +153,7 @@ void add_training_commands(CLI::App& program, Arguments& a) {
 
   CLI::App& sheet = *program.add_subcommand("sheet", "A picture of held-out objects under fixed prompts");
   add_folders(sheet, a);
-  sheet.add_option("--count", a.num_rows, "Objects")->check(CLI::PositiveNumber)->capture_default_str();
+  sheet.add_option("--count", a.num_rows, "Objects")->check(tools::whole_number(1))->capture_default_str();
   sheet.add_option("-o", a.sheet, "PNG to write")->required();
   sheet.callback([&a] { write_sheet(a.work, a.model, a.sheet, a.num_rows); });
 }

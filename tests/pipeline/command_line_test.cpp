@@ -1,10 +1,15 @@
 // The command line as a user meets it: help, exit codes, messages that say what to do, nothing left behind
 // after a refusal.
-#include <gtest/gtest.h>
+#include <memory>
 
+#include <gtest/gtest.h>
+#include <CLI/CLI.hpp>
+
+#include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/pipeline/options.h"
 #include "process.h"
+#include "program.h"
 #include "support.h"
 
 namespace patina::test {
@@ -41,13 +46,29 @@ void expect_refused(int exit_code, std::vector<std::string> arguments,
 }
 
 TEST(CommandLine, help_explains_every_option) {
-  const ProcessResult result = patina({"enhance", "--help"});
-  EXPECT_EQ(result.exit_code, 0);
-  for (const pipeline::Option& option : pipeline::options())
-    EXPECT_NE(result.output.find("--" + option.name), std::string::npos) << option.name;
-  for (const char* command : {"render", "detail", "fit", "report", "ablate", "show-attention", "info"})
-    EXPECT_EQ(patina({command, "--help"}).exit_code, 0) << command;
-  EXPECT_NE(patina({"--version"}).output.find("patina"), std::string::npos);
+  const std::unique_ptr<CLI::App> program = app::make_program();
+  const std::string help = program->get_subcommand("enhance")->help();
+  for (const pipeline::Option& option : pipeline::options()) {
+    EXPECT_NE(help.find("--" + option.name), std::string::npos) << option.name;
+    EXPECT_NE(help.find(option.group + ":"), std::string::npos) << option.group;
+  }
+  size_t num_options = 0;
+  for (const CLI::App* command : program->get_subcommands([](const CLI::App*) { return true; })) {
+    EXPECT_FALSE(command->get_description().empty()) << command->get_name();
+    for (const CLI::Option* option : command->get_options()) {
+      EXPECT_FALSE(option->get_description().empty()) << command->get_name() << " " << option->get_name();
+      ++num_options;
+    }
+  }
+  EXPECT_GT(num_options, 5 * pipeline::options().size() / 2) << "the commands share most of them";
+}
+
+TEST(CommandLine, help_and_version_go_to_standard_output) {
+  const ProcessResult help = patina({"report", "--help"}), version = patina({"--version"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_NE(help.output.find("--turntable"), std::string::npos) << help.output;
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_TRUE(version.output.starts_with("patina ")) << version.output;
 }
 
 TEST(CommandLine, wrong_usage_is_exit_code_2) {
@@ -66,6 +87,23 @@ TEST(CommandLine, wrong_usage_is_exit_code_2) {
                  {"--resolution", "multiple of 64"});
   expect_refused(2, {kettle(), "-p", "rust", "-m", model(), "--material", "rubber duck"},
                  {"rubber duck", "it has"});
+}
+
+// Those that are not in the pipeline's list, too.
+TEST(CommandLine, a_wrong_number_is_answered_with_what_was_expected) {
+  const auto expect = [](const std::string& option, const std::string& given) {
+    try {
+      app::make_program()->parse("show-attention a.glb -p rust -o a.html " + option + " " + given);
+      ADD_FAILURE() << option << " " << given << " is accepted";
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::kUsage);
+      EXPECT_EQ("--" + e.context(), option);
+      EXPECT_EQ(e.message(), "expected a whole number of 1 or more, found '" + given + "'");
+    }
+  };
+  expect("--view", "first");
+  expect("--view", "0");
+  expect("--step", "1.5");
 }
 
 TEST(CommandLine, options_that_a_command_does_not_use_are_refused_by_name) {

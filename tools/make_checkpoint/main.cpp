@@ -2,6 +2,7 @@
 // ControlNet, a VAE or a LoRA, for testing and measuring at the real size without anybody's weights.
 #include <map>
 
+#include "console/numbers.h"
 #include "console/program.h"
 #include "make_checkpoint/checkpoint.h"
 #include "patina/base/error.h"
@@ -47,9 +48,11 @@ int main(int argc, char** argv) {
   program.add_option("--size", size, "full | small [full]")->transform(CLI::CheckedTransformer(kSizes));
   program.add_option("--dtype", model.type, "f32 | f16 | bf16 [f16]")
       ->transform(CLI::CheckedTransformer(kTypes));
-  program.add_option("--seed", model.seed, "Of the values. [1]");
-  program.add_option("--vocabulary", vocabulary, "Tokens of the text encoder. [49408]");
-  program.add_option("--shards", folder.num_shards, "Files of the U-Net (diffusers). [1]");
+  program.add_option("--seed", model.seed, "Of the values. [1]")->check(tools::whole_number(0));
+  program.add_option("--vocabulary", vocabulary, "Tokens of the text encoder. [49408]")
+      ->check(tools::whole_number(1));
+  program.add_option("--shards", folder.num_shards, "Files of the U-Net (diffusers). [1]")
+      ->check(tools::whole_number(1));
   program.add_option("--variant", folder.variant, "In the names of weight files (diffusers), such as fp16.");
   program.add_option("--tokenizer", folder.tokenizer, "Folder to copy into the model (diffusers).");
   program.add_flag("--empty", model.empty, "Zeros that take no place on disk.");

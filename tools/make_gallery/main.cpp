@@ -67,6 +67,13 @@ struct Arguments {
   std::string only;
 };
 
+std::vector<std::string> names_of_pictures() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kEntries) names.emplace_back(entry.name);
+  for (const make_gallery::OptionSheet& sheet : kSheets) names.push_back(sheet.option);
+  return names;
+}
+
 fs::path asset_path(const Entry& entry, const Arguments& arguments) {
   const fs::path own = entry.asset;
   return fs::exists(own) ? own : arguments.shared / "assets" / own;
@@ -161,7 +168,8 @@ int main(int argc, char** argv) {
   program.add_option("--shared", arguments.shared, "Folder of shared assets")->capture_default_str();
   program.add_option("--work", arguments.work, "Folder of the runs")->capture_default_str();
   program.add_option("--docs", arguments.docs, "Folder that gets page and pictures")->capture_default_str();
-  program.add_option("--only", arguments.only,
-                     "Name of one picture, or an option of which the values are shown");
+  program
+      .add_option("--only", arguments.only, "Name of one picture, or an option of which the values are shown")
+      ->check(CLI::IsMember(names_of_pictures()));
   return tools::run_program(program, argc, argv, [&] { make(arguments); });
 }

@@ -1,10 +1,11 @@
 #include "patina/pipeline/options.h"
 
-#include <charconv>
+#include <cmath>
 
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "patina/base/text.h"
 #include "patina/pipeline/option_groups.h"
 #include "patina/pipeline/option_kinds.h"
 
@@ -21,26 +22,17 @@ std::vector<Option> make_options() {
   return list;
 }
 
-// nullopt where `text` is not a whole Number.
-template <class Number>
-std::optional<Number> parsed(const std::string& text) {
-  Number value{};
-  const char* const end = text.data() + text.size();
-  const auto [rest, failure] = std::from_chars(text.data(), end, value);
-  return failure == std::errc() && rest == end ? std::optional(value) : std::nullopt;
-}
-
 json value_of_text(const Option& option, const std::string& text) {
   if (!option.word.empty() && text == option.word) return text;
   switch (option.kind) {
     case ValueKind::kText:
       return text;
     case ValueKind::kInteger:
-      if (const auto value = parsed<uint64_t>(text)) return *value;
-      if (const auto value = parsed<int64_t>(text)) return *value;
+      if (const auto value = parse_number<uint64_t>(text)) return *value;
+      if (const auto value = parse_number<int64_t>(text)) return *value;
       break;
     case ValueKind::kNumber:
-      if (const auto value = parsed<float>(text); value && std::isfinite(*value)) return *value;
+      if (const auto value = parse_number<float>(text); value && std::isfinite(*value)) return *value;
       break;
     case ValueKind::kTruth:
       if (text == "true" || text == "false") return text == "true";
