@@ -134,6 +134,17 @@ TEST(RunFolder, refuses_a_second_owner) {
   EXPECT_THROW(RunFolder(folder.path() / "run"), Error);
 }
 
+TEST(RunFolder, is_free_again_after_its_record_was_refused) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path record = folder.path() / "run" / "stages.json";
+  for (const std::string_view malformed : {"[{\"name\": 3}]", "not JSON"}) {
+    write_file(record, malformed);
+    EXPECT_THROW(RunFolder(folder.path() / "run"), Error);
+    write_file(record, std::string_view("[]"));
+    EXPECT_NO_THROW(RunFolder(folder.path() / "run"));
+  }
+}
+
 TEST(RunFolder, refuses_a_record_that_is_not_one) {
   const test::TemporaryFolder folder;
   write_file(folder.path() / "run" / "stages.json", std::string_view("[{\"name\": 3}]"));

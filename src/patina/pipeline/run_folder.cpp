@@ -63,6 +63,22 @@ void write_json(const fs::path& path, const json& values) {
   write_file(path, values.dump(2) + "\n");
 }
 
+RunFolder::Lock::Lock(const fs::path& folder)
+    : file_(::open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+  if (file_ < 0)
+    throw Error(ErrorCode::kIo, folder.string(),
+                fmt::format("the run folder cannot be written: {}", std::strerror(errno)));
+  if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
+    ::close(file_);
+    throw Error(ErrorCode::kIo, folder.string(),
+                "another patina works in this run folder; wait for it, or choose another folder");
+  }
+}
+
+RunFolder::Lock::~Lock() {
+  ::close(file_);
+}
+
 RunFolder::RunFolder(const fs::path& path) : path_(path) {
   std::error_code failure;
   for (fs::path at = fs::absolute(path_); at.has_relative_path() && !fs::exists(at, failure);
@@ -76,15 +92,7 @@ RunFolder::RunFolder(const fs::path& path) : path_(path) {
   fs::create_directories(path_, failure);
   if (failure)
     throw Error(ErrorCode::kIo, path_.string(), "the run folder cannot be made: " + failure.message());
-  lock_ = ::open((path_ / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (lock_ < 0)
-    throw Error(ErrorCode::kIo, path_.string(),
-                fmt::format("the run folder cannot be written: {}", std::strerror(errno)));
-  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    ::close(lock_);
-    throw Error(ErrorCode::kIo, path_.string(),
-                "another patina works in this run folder; wait for it, or choose another folder");
-  }
+  lock_.emplace(path_);
   if (!fs::exists(path_ / "stages.json")) return;
   try {
     for (const json& stage : read_json(path_ / "stages.json")) stages_.push_back(stage_from_json(stage));
@@ -101,7 +109,6 @@ RunFolder::~RunFolder() {
     // Folders in which something else lies by now stay.
     for (const fs::path& folder : made_) fs::remove(folder, ignored);
   }
-  ::close(lock_);
 }
 
 // Whether nothing lies here but what every run leaves before its first stage.

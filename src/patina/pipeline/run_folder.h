@@ -88,6 +88,17 @@ class RunFolder {
   std::optional<SavedCheckpoint> load_checkpoint(std::string_view stage, const std::string& key);
 
  private:
+  /// The lock on an open file; whoever holds the object holds the folder.
+  class Lock {
+   public:
+    explicit Lock(const std::filesystem::path& folder);
+    ~Lock();
+    Lock(const Lock&) = delete;
+    Lock& operator=(const Lock&) = delete;
+
+   private:
+    int file_;
+  };
   bool is_complete(const StageRecord& stage) const;
   bool is_unused() const;
   struct ChangedByHand {
@@ -100,7 +111,7 @@ class RunFolder {
 
   std::filesystem::path path_;
   std::vector<std::filesystem::path> made_;  // folders that were not there before, innermost first
-  int lock_ = -1;
+  std::optional<Lock> lock_;
   bool keep_ = false;
   std::vector<StageRecord> stages_;
   // Of the stage that is running: when it started here, and what a killed run had spent on it.
