@@ -1,23 +1,33 @@
 #!/usr/bin/env bash
-# clang-tidy on the sources that differ from where this branch left main. Configures build/tidy, without precompiled
-# headers, since clang cannot read GCC's.
-#   scripts/check_tidy.sh [MOST]   nothing is checked where more than MOST files differ
+# clang-tidy on sources. Configures build/tidy, without precompiled headers, since clang cannot read GCC's.
+#   scripts/check_tidy.sh         those that differ from where this branch left main
+#   scripts/check_tidy.sh MOST    the MOST that were changed last, on whatever branch
 set -euo pipefail
 cd "$(dirname "$0")/.."
-most="${1:-10000}"
-base=$(git merge-base HEAD origin/main 2>/dev/null || git merge-base HEAD main 2>/dev/null) || {
-  echo "clang-tidy: no main to compare with; nothing checked"
-  exit 0
+sources=('src/*.cpp' 'apps/*.cpp' 'tools/*.cpp' 'bench/*.cpp' 'mini/*.cpp')
+
+changed_since_main() {
+  local base
+  base=$(git merge-base HEAD origin/main 2>/dev/null || git merge-base HEAD main 2>/dev/null) || {
+    echo "clang-tidy: no main to compare with; give the number of sources to check" >&2
+    return 1
+  }
+  git diff --name-only --diff-filter=d "$base" -- "${sources[@]}"
 }
-mapfile -t files < <(git diff --name-only --diff-filter=d "$base" -- 'src/*.cpp' 'apps/*.cpp' 'tools/*.cpp' 'bench/*.cpp' 'mini/*.cpp')
-echo "clang-tidy: ${#files[@]} changed files"
+
+changed_last() {
+  { git diff --name-only HEAD -- "${sources[@]}"
+    git log --no-merges --format= --name-only -- "${sources[@]}"; } |
+    awk -v most="$1" 'n < most && !seen[$0]++ && system("test -e \"" $0 "\"") == 0 { print; ++n }'
+}
+
+if (($# > 0)); then list=$(changed_last "$1"); else list=$(changed_since_main); fi
+mapfile -t files < <(printf '%s' "$list")
+echo "clang-tidy: ${#files[@]} sources"
 if ((${#files[@]} == 0)); then exit 0; fi
-if ((${#files[@]} > most)); then
-  echo "clang-tidy: more than $most files differ, which would take too long; nothing checked (make tidy checks them)"
-  exit 0
-fi
 mkdir -p build
-cmake --preset release -B build/tidy -DPATINA_PCH=OFF -DPATINA_WERROR=OFF -DPATINA_BUILD_MINI=ON > build/tidy.log 2>&1 || {
+cmake --preset release -B build/tidy -DPATINA_PCH=OFF -DPATINA_WERROR=OFF -DPATINA_BUILD_BENCH=ON -DPATINA_BUILD_MINI=ON \
+  > build/tidy.log 2>&1 || {
   cat build/tidy.log
   exit 1
 }

@@ -100,7 +100,7 @@ std::shared_ptr<GivenOptions> add_options(CLI::App& command, const std::string& 
                   "How progress is told on standard error: plain for people, json for programs, one event a "
                   "line (docs/progress.md). [plain]")
       ->type_name("plain|json")
-      ->check(CLI::IsMember({"plain", "json"}))
+      ->check(CLI::IsMember({"plain", "json"}).description(""))  // the type name says it
       ->group("Machine");
   command.add_flag("-q,--quiet", given->quiet, "No progress and no notes; errors still show.")
       ->group("Machine");

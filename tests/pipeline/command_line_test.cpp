@@ -52,6 +52,7 @@ TEST(CommandLine, help_explains_every_option) {
     EXPECT_NE(help.find("--" + option.name), std::string::npos) << option.name;
     EXPECT_NE(help.find(option.group + ":"), std::string::npos) << option.group;
   }
+  EXPECT_EQ(help.find(":{"), std::string::npos) << "choices are listed once";
   size_t num_options = 0;
   for (const CLI::App* command : program->get_subcommands([](const CLI::App*) { return true; })) {
     EXPECT_FALSE(command->get_description().empty()) << command->get_name();

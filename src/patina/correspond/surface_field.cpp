@@ -1,6 +1,7 @@
 #include "patina/correspond/surface_field.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "patina/base/random.h"
 #include "patina/views/visibility.h"
@@ -25,7 +26,8 @@ SurfaceField::SurfaceField(const render::Scene& scene, double points_per_area, i
   double density = total > 0.0 && std::isfinite(points_per_area) ? std::max(points_per_area, 0.0) : 0.0;
   if (density * total > static_cast<double>(max_points)) density = static_cast<double>(max_points) / total;
   first_point_.reserve(area_up_to.size());
-  for (const double area : area_up_to) first_point_.push_back(static_cast<int64_t>(density * area + 0.5));
+  for (const double area : area_up_to)
+    first_point_.push_back(static_cast<int64_t>(std::llround(density * area)));
 }
 
 size_t SurfaceField::triangle_of_point(int64_t point) const {

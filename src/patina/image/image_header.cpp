@@ -128,7 +128,8 @@ ImageHeader inspect_png(Bytes bytes, const std::string& name, const ImageLimits&
   if (color_type == 3 && !has_palette)
     fail(name, "the PNG file has palette colour but no palette (PLTE chunk)");
   check_size(name, static_cast<uint64_t>(header.width), static_cast<uint64_t>(header.height),
-             static_cast<uint64_t>(depth * color.channels), idat_bytes * kMaxDeflateRatio, limits);
+             static_cast<uint64_t>(depth) * static_cast<uint64_t>(color.channels),
+             idat_bytes * kMaxDeflateRatio, limits);
   header.channels = (color_type == 3 ? 3 : color.channels) + (has_transparency && color_type <= 3 ? 1 : 0);
   return header;
 }

@@ -214,7 +214,7 @@ void make_finite(HdrImage& hdr, float largest, const std::string& name) {
 
 // Encodes through OpenImageIO into memory.
 std::vector<uint8_t> encode(const Image& image, const char* format, const OIIO::ImageSpec& spec,
-                            OIIO::TypeDesc type, const void* pixels) {
+                            const OIIO::TypeDesc& type, const void* pixels) {
   configure_oiio();
   PATINA_CHECK(!image.empty());
   OIIO::Filesystem::IOVecOutput proxy;
@@ -231,7 +231,7 @@ std::vector<uint8_t> encode_8_bit(const Image& image, const char* format, int qu
   std::vector<uint8_t> stored(image.pixels.size());
   // !(v > 0) also sends NaN to zero.
   std::transform(image.pixels.begin(), image.pixels.end(), stored.begin(), [](float v) {
-    return !(v > 0.0f) ? uint8_t{0} : static_cast<uint8_t>(std::min(v, 1.0f) * 255.0f + 0.5f);
+    return !(v > 0.0f) ? uint8_t{0} : static_cast<uint8_t>(std::lround(std::min(v, 1.0f) * 255.0f));
   });
   OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::UINT8);
   if (image.channels == 2 || image.channels == 4) spec.alpha_channel = image.channels - 1;
