@@ -118,6 +118,7 @@ CapturedAttention capture_attention(const Model& model, const EditInputs& inputs
       [&](int index, size_t size) { return scheduler_noise(options.seed, index, size); },
       [&](const SamplerState& after, const Guided&) { report(after.next_call); }};
   callbacks.end = call + 1;
+  if (run->late) callbacks.late = &*run->late;
   sample(run->denoiser, run->plan, std::move(run->state), run->shape, callbacks);
   PATINA_CHECK_EQ(static_cast<int64_t>(captured.q.size()),
                   layer.width * layer.height * layer.num_heads * layer.head_dim);

@@ -52,13 +52,14 @@ std::vector<Image> edit_views(const Model& model, const EditInputs& inputs, cons
   };
   report(run->state.next_call);
   progress.throw_if_stopped();
-  const SamplerCallbacks callbacks{
-      [&](int call, size_t size) { return scheduler_noise(options.seed, call, size); },
-      [&](const SamplerState& after, const Guided&) {
-        if (hooks.on_checkpoint) hooks.on_checkpoint({after.next_call, to_bytes(after)});
-        report(after.next_call);
-        progress.throw_if_stopped();
-      }};
+  SamplerCallbacks callbacks{[&](int call, size_t size) { return scheduler_noise(options.seed, call, size); },
+                             [&](const SamplerState& after, const Guided&) {
+                               if (hooks.on_checkpoint)
+                                 hooks.on_checkpoint({after.next_call, to_bytes(after)});
+                               report(after.next_call);
+                               progress.throw_if_stopped();
+                             }};
+  if (run->late) callbacks.late = &*run->late;
   std::vector<float> latents = sample(run->denoiser, run->plan, std::move(run->state), run->shape, callbacks);
   for (const float value : latents) {
     if (!std::isfinite(value)) {

@@ -22,6 +22,9 @@ struct EditInputs {
       bias_levels;  // finest first; empty: no bias; levels coarser than the U-Net's coarsest are not used
   std::vector<Image> start_views = {};  // grid² × [H,W,3] sRGB [0,1]: start image where it is not the tile
                                         // condition; empty: tile_views
+  std::vector<Image> strength_views = {};  // grid² × [H,W,1] [0,1]: share of EditOptions::strength with which
+                                           // a place is edited, 0: not at all, below 0: shows nothing that
+                                           // has a strength (late_join.h); empty: 1 everywhere
 };
 
 /// Where a run stands between two steps, as bytes that restore it exactly; for resuming a killed run.

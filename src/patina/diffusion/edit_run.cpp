@@ -21,17 +21,18 @@ std::string size_text(int64_t width, int64_t height) {
   return std::to_string(width) + " × " + std::to_string(height);
 }
 
-void check_views(const std::vector<Image>& views, const std::string& name, const GridSizes& sizes) {
+void check_views(const std::vector<Image>& views, const std::string& name, const GridSizes& sizes,
+                 int channels = 3) {
   const auto expected = static_cast<size_t>(sizes.grid * sizes.grid);
   if (views.size() != expected) {
     usage(name, "there are " + std::to_string(views.size()) + " images, expected " +
                     std::to_string(expected) + " for a grid of " + size_text(sizes.grid, sizes.grid));
   }
   for (const Image& view : views) {
-    if (view.width != sizes.view_width || view.height != sizes.view_height || view.channels != 3) {
+    if (view.width != sizes.view_width || view.height != sizes.view_height || view.channels != channels) {
       usage(name, "an image is " + size_text(view.width, view.height) + " with " +
                       std::to_string(view.channels) + " channels, expected " +
-                      size_text(sizes.view_width, sizes.view_height) + " with 3");
+                      size_text(sizes.view_width, sizes.view_height) + " with " + std::to_string(channels));
     }
   }
 }
@@ -68,6 +69,7 @@ GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const Edit
   for (const ControlKind& kind : kControlKinds)
     check_views(inputs.*kind.views, std::string(kind.name) + " views", sizes);
   if (!inputs.start_views.empty()) check_views(inputs.start_views, "start views", sizes);
+  if (!inputs.strength_views.empty()) check_views(inputs.strength_views, "strength views", sizes, 1);
   const int64_t noise_size =
       model.latent_channels() * sizes.grid * sizes.grid * sizes.latent_height * sizes.latent_width;
   if (static_cast<int64_t>(inputs.noise.size()) != noise_size) {
@@ -188,6 +190,20 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
                    &run->bias,
                    options.bias_controlnet};
 
+  // Where each latent pixel joins; without strengths all do so at the start.
+  std::vector<int> calls;
+  if (!inputs.strength_views.empty())
+    calls = first_calls(run->plan, options.strength,
+                        latent_strengths(inputs.strength_views, inputs.grid, model.latent_scale()));
+  const bool joins_late =
+      std::any_of(calls.begin(), calls.end(), [&](int call) { return call > run->start; });
+  std::vector<float> x0;
+  if (joins_late || !resume)
+    x0 = start_latents(*networks.vae.use(),
+                       inputs.start_views.empty() ? inputs.tile_views : inputs.start_views, sizes.grid,
+                       progress);
+  if (joins_late) run->late = LateJoin{calls, x0, inputs.noise};
+
   // The start: the images at the noise level of the first step [Meng2022], or where an earlier run stood.
   SamplerState& state = run->state;
   if (resume) {
@@ -198,12 +214,8 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
                   "belongs to a run with other sizes or steps; start the stage again");
     }
   } else {
-    const std::vector<Image>& start_views =
-        inputs.start_views.empty() ? inputs.tile_views : inputs.start_views;
     state.next_call = run->start;
-    state.latents =
-        add_noise(run->plan, run->start,
-                  start_latents(*networks.vae.use(), start_views, sizes.grid, progress), inputs.noise);
+    state.latents = add_noise(run->plan, run->start, x0, inputs.noise);
   }
   return run;
 }

@@ -28,6 +28,7 @@ struct EditRun {
   Denoiser denoiser;
   SamplerState state;
   std::array<int64_t, 4> shape{};  // of the grid's latents: [1,C,H,W]
+  std::optional<LateJoin> late;    // where the inputs give strengths other than 1
 
   EditRun() = default;
   EditRun(const EditRun&) = delete;

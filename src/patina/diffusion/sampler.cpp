@@ -54,15 +54,24 @@ std::vector<float> sample(const Denoiser& denoiser, const SchedulePlan& plan, Sa
   const int end = std::min(callbacks.end.value_or(plan.num_calls()), plan.num_calls());
   while (state.next_call < end) {
     const int index = state.next_call;
+    if (callbacks.late) hold_latents(*callbacks.late, plan, index, state.latents);
     std::vector<float> input = scale_model_input(plan, index, state.latents);
     const Guided prediction =
         denoiser(at::from_blob(input.data(), shape, at::kFloat), plan.timesteps[static_cast<size_t>(index)]);
     const std::vector<float> noise =
         needs_noise(plan, index) ? callbacks.noise(index, state.latents.size()) : std::vector<float>{};
-    state.latents = step(plan, state.scheduler, index, values_of(prediction.guided), state.latents, noise);
+    std::vector<float> held;
+    std::span<const float> output = values_of(prediction.guided);
+    if (callbacks.late) {
+      held.assign(output.begin(), output.end());
+      hold_output(*callbacks.late, plan, index, held);
+      output = held;
+    }
+    state.latents = step(plan, state.scheduler, index, output, state.latents, noise);
     ++state.next_call;
     if (callbacks.on_step) callbacks.on_step(state, prediction);
   }
+  if (callbacks.late && end == plan.num_calls()) restore_start(*callbacks.late, plan, state.latents);
   return std::move(state.latents);
 }
 

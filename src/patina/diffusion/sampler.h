@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "patina/base/progress.h"
+#include "patina/diffusion/late_join.h"
 #include "patina/diffusion/networks/controlnet.h"
 #include "patina/diffusion/networks/held.h"
 #include "patina/diffusion/networks/unet.h"
@@ -61,6 +62,8 @@ struct SamplerCallbacks {
   std::function<void(const SamplerState& state, const Guided& prediction)> on_step;
   /// Only calls before this index are run; nullopt: all.
   std::optional<int> end = std::nullopt;
+  /// Pixels that join late; null: all are denoised from the first call on.
+  const LateJoin* late = nullptr;
 };
 
 /// Runs the plan's calls from `state` on and returns the last latents [C,H,W]. `shape` is [1,C,H,W].

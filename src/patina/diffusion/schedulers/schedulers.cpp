@@ -40,24 +40,45 @@ std::vector<float> scale_model_input(const SchedulePlan& plan, int index, std::s
   return combine({{1 / std::sqrt(sigma * sigma + 1), x}});
 }
 
-std::vector<float> add_noise(const SchedulePlan& plan, int index, std::span<const float> x0,
-                             std::span<const float> noise) {
+namespace {
+
+// Call `index` in the variance-preserving frame: x = alpha x0 + sigma noise.
+struct Mixture {
+  double alpha, sigma;
+};
+Mixture mixture_at(const SchedulePlan& plan, int index) {
   const size_t i = static_cast<size_t>(index);
-  switch (plan.config.solver) {
-    case Solver::kDdim:
-    case Solver::kPndm: {
-      const double alpha_bar = plan.alphas_cumprod.at(static_cast<size_t>(plan.timesteps.at(i)));
-      return combine({{std::sqrt(alpha_bar), x0}, {std::sqrt(1 - alpha_bar), noise}});
-    }
-    case Solver::kEuler:
-    case Solver::kEulerAncestral:
-      return combine({{1, x0}, {plan.sigmas.at(i), noise}});
-    case Solver::kDpmSolverPp:
-    case Solver::kUniPc:
-      break;
+  if (plan.config.solver == Solver::kDdim || plan.config.solver == Solver::kPndm) {
+    const double alpha_bar = plan.alphas_cumprod.at(static_cast<size_t>(plan.timesteps.at(i)));
+    return {std::sqrt(alpha_bar), std::sqrt(1 - alpha_bar)};
   }
   const NoiseLevel level = noise_level(plan.sigmas.at(i));
-  return combine({{level.alpha, x0}, {level.sigma, noise}});
+  return {level.alpha, level.sigma};
+}
+
+}  // namespace
+
+std::vector<float> add_noise(const SchedulePlan& plan, int index, std::span<const float> x0,
+                             std::span<const float> noise) {
+  if (plan.config.solver == Solver::kEuler || plan.config.solver == Solver::kEulerAncestral)
+    return combine({{1, x0}, {plan.sigmas.at(static_cast<size_t>(index)), noise}});
+  const Mixture mixture = mixture_at(plan, index);
+  return combine({{mixture.alpha, x0}, {mixture.sigma, noise}});
+}
+
+std::vector<float> exact_output(const SchedulePlan& plan, int index, std::span<const float> x0,
+                                std::span<const float> noise) {
+  switch (plan.config.prediction) {
+    case Prediction::kEpsilon:
+      return {noise.begin(), noise.end()};
+    case Prediction::kV: {
+      const Mixture mixture = mixture_at(plan, index);
+      return combine({{mixture.alpha, noise}, {-mixture.sigma, x0}});
+    }
+    case Prediction::kSample:
+      break;
+  }
+  return {x0.begin(), x0.end()};
 }
 
 bool needs_noise(const SchedulePlan& plan, int index) {

@@ -104,6 +104,11 @@ std::vector<float> scale_model_input(const SchedulePlan& plan, int index, std::s
 std::vector<float> add_noise(const SchedulePlan& plan, int index, std::span<const float> x0,
                              std::span<const float> noise);
 
+/// What a network would say at call `index` that knew x0 and the noise, in the terms of the configuration's
+/// prediction. Steps with it lead to x0.
+std::vector<float> exact_output(const SchedulePlan& plan, int index, std::span<const float> x0,
+                                std::span<const float> noise);
+
 /// Whether step(index) adds fresh unit-variance noise.
 bool needs_noise(const SchedulePlan& plan, int index);
 
