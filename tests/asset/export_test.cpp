@@ -54,6 +54,41 @@ TEST(Export, unchanged_glb_is_the_same_file) {
   EXPECT_EQ(read_file(folder.path() / "out.glb"), read_file(asset.path));
 }
 
+// Texels that stay as they came keep their stored values, whatever factor, scale or encoding lies between.
+TEST(Export, untouched_texels_keep_their_stored_values_beside_changed_ones) {
+  const TemporaryFolder folder;
+  TinyGltf g = packed_quad();
+  Image normal = gradient_image(4, 4, 3, 3);  // no unit vectors
+  for (size_t i = 2; i < normal.pixels.size(); i += 3) normal.pixels[i] = 0.9f;
+  g.add_image(normal);
+  g.json["materials"][0]["normalTexture"]["index"] = 3;
+  g.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.7, 0.9, 0.8, 1.0};
+  const Asset asset = read_asset(g.write_glb(folder.path()));
+  std::vector<MaterialMaps> maps = resolve_materials(asset);
+  std::vector<MapSet> changed = no_change(asset);
+  changed[0] = set_of({MapSlot::kBaseColor, MapSlot::kRoughness, MapSlot::kNormal});
+  maps[0].base_color.texels.set_rgb(3, 3, vec3(0.25f, 0.125f, 0.0625f));
+  *maps[0].roughness.texels.at(2, 1) = 0.35f;
+  maps[0].normal.texels.set_rgb(1, 1, vec3(0, 0, 1));
+  export_asset(asset, maps, changed, folder.path() / "out.glb");
+  const Asset after = read_asset(folder.path() / "out.glb");
+  const auto compare = [&](const TextureRef& was, const TextureRef& is, int x, int y) {
+    const Image &old = asset.images[static_cast<size_t>(was.image)],
+                &now = after.images[static_cast<size_t>(is.image)];
+    ASSERT_EQ(old.pixels.size(), now.pixels.size());
+    for (size_t i = 0; i < old.num_pixels(); ++i) {
+      const auto channels = static_cast<size_t>(old.channels);
+      const bool same = std::equal(&old.pixels[i * channels], &old.pixels[i * channels] + channels,
+                                   &now.pixels[i * channels]);
+      EXPECT_EQ(same, static_cast<int>(i) != y * old.width + x) << i;
+    }
+  };
+  const Material &was = asset.materials[0], &is = after.materials[0];
+  compare(was.base_color, is.base_color, 3, 3);
+  compare(was.metallic_roughness, is.metallic_roughness, 2, 1);
+  compare(was.normal, is.normal, 1, 1);
+}
+
 TEST(Export, unchanged_gltf_keeps_json_and_carries_its_files_over) {
   const TemporaryFolder folder;
   const Asset asset = read_asset(packed_quad().write_gltf(folder.path()));

@@ -99,7 +99,7 @@ void export_asset(const Asset& asset, std::span<const MaterialMaps> maps, std::s
   PATINA_CHECK_EQ(maps.size(), asset.materials.size());
   PATINA_CHECK_EQ(changed.size(), asset.materials.size());
   PATINA_CHECK(asset.source != nullptr);
-  const ExportRequest request{asset, maps, changed, path, plan_export(asset, path)};
+  const ExportRequest request{asset, resolve_materials(asset), maps, changed, path, plan_export(asset, path)};
   if (asset.source->kind != SourceDocument::Kind::kObj) return export_gltf(request);
   return request.plan.kind == OutputKind::kGlb ? export_obj_as_glb(request) : export_obj(request);
 }

@@ -33,6 +33,7 @@ Error too_large_for_glb(const std::filesystem::path& output, uint64_t bytes);
 /// What one export is asked for. `path` is the output file.
 struct ExportRequest {
   const Asset& asset;
+  std::vector<MaterialMaps> before;  // the asset's own maps
   std::span<const MaterialMaps> maps;
   std::span<const MapSet> changed;
   std::filesystem::path path;

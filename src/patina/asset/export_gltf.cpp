@@ -134,7 +134,7 @@ class GltfExporter {
     const Material& material = asset().materials[i];
     const MaterialMaps& maps = request_.maps[i];
     const MapSet& changed = request_.changed[i];
-    const BakedMaterial out = baked(asset(), material, maps, changed);
+    const BakedMaterial out = baked(asset(), material, request_.before[i], maps, changed);
     const bool is_new = i >= array_size(root_, "materials");
     const nlohmann::json old = is_new ? nlohmann::json::object() : root_["materials"][i];
     const std::string name = material.name.empty() ? fmt::format("material{}", i) : material.name;

@@ -51,7 +51,7 @@ Statements statements_of(const ExportRequest& request, size_t i, SidecarFiles& s
   const Material& material = request.asset.materials[i];
   const MaterialMaps& maps = request.maps[i];
   const MapSet& changed = request.changed[i];
-  const BakedMaterial out = baked(request.asset, material, maps, changed);
+  const BakedMaterial out = baked(request.asset, material, request.before[i], maps, changed);
   const std::string name = request.path.string();
   Statements statements;
   const auto texture = [&](const char* keyword, const char* slot, const Image& image, const Map& map) {
@@ -231,7 +231,7 @@ Json material_json(const ExportRequest& request, size_t i, GlbBuilder& builder) 
   const Material& m = asset.materials[i];
   const MaterialMaps& maps = request.maps[i];
   const MapSet& changed = request.changed[i];
-  const BakedMaterial out = baked(asset, m, maps, changed);
+  const BakedMaterial out = baked(asset, m, request.before[i], maps, changed);
   const auto image_of = [&](const TextureRef& ref) -> const Image& {
     return asset.images[static_cast<size_t>(ref.image)];
   };

@@ -20,8 +20,9 @@ struct BakedMaterial {
 
 /// Factors are kept where every texel can be written as factor × stored value with a stored value of at most
 /// one; else they become one. A slot that had no texture gets factor one, and the packed partner that was not
-/// changed keeps its factor under a channel of ones.
-BakedMaterial baked(const Asset& asset, const Material& material, const MaterialMaps& maps,
-                    const MapSet& changed);
+/// changed keeps its factor under a channel of ones. A texel that is as in `before`, the asset's own maps,
+/// keeps its stored value where the texture keeps its size and its factor.
+BakedMaterial baked(const Asset& asset, const Material& material, const MaterialMaps& before,
+                    const MaterialMaps& maps, const MapSet& changed);
 
 }  // namespace patina::asset
