@@ -10,7 +10,7 @@ add_library(patina_all INTERFACE)
 target_link_libraries(patina_all INTERFACE patina_pipeline)
 set_target_properties(patina_all PROPERTIES EXPORT_NAME patina)
 
-set(patina_libraries base image asset render views correspond attention nn diffusion inverse report pipeline)
+set(patina_libraries base image asset render views masks correspond attention nn diffusion inverse report pipeline)
 list(TRANSFORM patina_libraries PREPEND patina_)
 foreach(library options torch ${patina_libraries})
   string(REGEX REPLACE "^patina_" "" name "${library}")

@@ -83,14 +83,14 @@ void add_render(CLI::App& program) {
 void add_detail(CLI::App& program) {
   add_stage_on_run(program, "detail",
                    "Stage 2: let the diffusion model edit the views of a run folder (views/ → detail/).",
-                   pipeline::kEdit, pipeline::run_edit, "detail");
+                   pipeline::kEdit | pipeline::kMasks, pipeline::run_edit, "detail");
 }
 
 void add_fit(CLI::App& program) {
   add_stage_on_run(program, "fit",
                    "Stage 3: carry the edited views of a run folder into textures (detail/ → textures/, and "
                    "the asset with -o).",
-                   pipeline::kFit | pipeline::kOutput, pipeline::run_fit, "textures");
+                   pipeline::kFit | pipeline::kMasks | pipeline::kOutput, pipeline::run_fit, "textures");
 }
 
 void add_report(CLI::App& program) {

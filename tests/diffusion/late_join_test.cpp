@@ -74,9 +74,11 @@ TEST(LateJoin, a_pixel_of_half_the_strength_is_a_run_of_half_the_strength) {
   });
 }
 
-// Until it joins, a pixel is the noised start image at every call, also inside solvers that remember.
+// Until it joins, a pixel is the noised start image at every call, also inside solvers that remember. Not so
+// PNDM, whose second call of a run repeats a time: there hold_latents leads back.
 TEST(LateJoin, solvers_carry_held_pixels_along_the_noised_start_image) {
   for_all_plans([](const SchedulePlan& plan) {
+    if (plan.config.solver == Solver::kPndm) return;
     const int start = start_index(plan, 0.8);
     const LateJoin late{std::vector<int>(4, plan.num_calls()), kStart, kNoise};
     std::vector<float> x = add_noise(plan, start, kStart, kNoise);

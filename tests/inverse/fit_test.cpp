@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "patina/asset/texel_raster.h"
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
 #include "patina/base/random.h"
@@ -542,6 +543,62 @@ TEST(texture_field, splatting_is_the_adjoint_of_sampling) {
   EXPECT_NEAR(left, right, 1e-5 * std::abs(left));
 }
 
+// Strengths of the floor (material 0) of 8 × 8 texels: black on its left half, and the wall may change
+// freely.
+std::vector<asset::Map> half_masked() {
+  std::vector<asset::Map> strength(2);
+  strength[0].texels = Image(8, 8, 1);
+  for (int y = 0; y < 8; ++y)
+    for (int x = 4; x < 8; ++x) *strength[0].texels.at(x, y) = 1.0f;
+  strength[1].texels = Image(1, 1, 1, 1.0f);
+  return strength;
+}
+
+TEST(fit, texels_without_strength_keep_their_values_in_every_map) {
+  Task task = make_task(64);
+  const std::vector<asset::Map> strength = half_masked();
+  inverse::FitOptions options = quick();
+  const auto before = task.world.scene.materials();
+  for (const int size : {0, 32}) {  // 32: textures finer than the mask
+    options.texture_size = size;
+    const auto result =
+        inverse::fit_materials(task.world.scene, {task.views, task.edited, {}, strength}, options, {}, {});
+    for (const asset::MapSlotRow& row : asset::kMapSlots) {
+      if (!has(options.maps, row.slot)) continue;
+      const asset::Map& now = slot_map(result.maps[0], row.slot);
+      const Image old =
+          asset::resized(slot_map(before[0], row.slot), now.texels.width, now.texels.height).texels;
+      const auto channels = static_cast<size_t>(old.channels);
+      size_t changed = 0;
+      for (size_t i = 0; i < old.num_pixels(); ++i) {
+        const bool same = std::equal(&old.pixels[i * channels], &old.pixels[i * channels] + channels,
+                                     &now.texels.pixels[i * channels]);
+        const bool masked = 2 * (static_cast<int>(i) % old.width) < old.width;
+        if (masked) {
+          EXPECT_TRUE(same) << row.name << " texel " << i;
+        } else {
+          changed += !same;
+        }
+      }
+      if (row.slot == asset::MapSlot::kBaseColor) {
+        EXPECT_GT(changed, old.num_pixels() / 4);
+      }
+    }
+  }
+}
+
+TEST(fit, full_strength_everywhere_is_a_fit_without_masks) {
+  Task task = make_task(), again = make_task();
+  std::vector<asset::Map> strength(2);
+  strength[0].texels = Image(8, 8, 1, 1.0f);
+  strength[1].texels = Image(1, 1, 1, 1.0f);
+  inverse::FitOptions options = quick();
+  const auto plain = inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, {}, {});
+  const auto masked =
+      inverse::fit_materials(again.world.scene, {again.views, again.edited, {}, strength}, options, {}, {});
+  EXPECT_EQ(all_texels(masked), all_texels(plain));
+}
+
 TEST(texture_field, dilation_fills_from_the_nearest_and_stops) {
   asset::Map map;
   map.wrap_s = map.wrap_t = asset::Wrap::kClampToEdge;
@@ -549,7 +606,7 @@ TEST(texture_field, dilation_fills_from_the_nearest_and_stops) {
   Image valid(9, 1, 1);
   valid.pixels[4] = 1.0f;
   map.texels.pixels[4] = 3.0f;
-  const Image filled = inverse::dilated(map, valid, 2);
+  const Image filled = asset::dilated(map, valid, 2);
   const std::vector<float> expected{0, 0, 3, 3, 3, 3, 3, 0, 0};
   EXPECT_EQ(filled.pixels, expected);
 }

@@ -25,6 +25,7 @@ const std::map<std::string, Folders> kStandsOn{
     {"asset", {"image"}},
     {"render", {"asset"}},
     {"views", {"render"}},
+    {"masks", {"views"}},
     {"attention", {"base"}},
     {"correspond", {"views", "attention"}},
     {"nn", {"attention"}},
@@ -32,7 +33,7 @@ const std::map<std::string, Folders> kStandsOn{
     {"diffusion", {"nn", "image"}},
     {"inverse", {"views"}},
     {"report", {"inverse", "correspond"}},
-    {"pipeline", {"report", "diffusion", "inverse", "correspond"}},
+    {"pipeline", {"report", "diffusion", "inverse", "correspond", "masks"}},
 };
 
 Folders reachable(const std::string& folder) {

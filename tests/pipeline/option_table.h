@@ -29,6 +29,11 @@ inline const std::vector<OptionCase> kOptionCases{
     {"normal-scale", {"0.5"}, kFromEdit},
     {"fine-detail", {"0.5"}, kFromEdit},
 
+    {"mask", {"FILE:mask.png"}, kFromEdit},
+    {"mask-vertex-color", {"true"}, kFromEdit},
+    {"protect", {"enamel"}, kFromEdit},
+    {"where", {"up:0.5"}, kFromEdit},
+
     {"output", {"FILE:out.glb"}, ""},
     {"run", {"FILE:elsewhere"}, ""},
     {"keep", {"true"}, ""},

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "option_table.h"
+#include "patina/asset/export.h"
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/enhance.h"
@@ -19,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-const char* const kStages[] = {"render", "detail", "fit", "report"};
+const char* const kStages[] = {"render", "detail", "fit", "report"};  // masks run where they are given
 
 // A safetensors file of f32 tensors: name, shape, and one value for all elements.
 struct Tensor {
@@ -55,10 +56,14 @@ class Rerun : public testing::Test {
     const fs::path tiny = test::data_dir() / "tiny-sd";
     fs::copy(tiny, file("model"), fs::copy_options::recursive);
     fs::create_directories(file("model-dir"));
-    fs::copy(kettle(), file("context.glb"));
+    fs::copy(example(), file("context.glb"));
     Image sky(8, 4, 3);
     for (size_t i = 0; i < sky.pixels.size(); ++i) sky.pixels[i] = 0.25f * static_cast<float>(i % 7);
     write_image(file("sky.exr"), sky);
+    Image mask(32, 32, 1, 1.0f);
+    for (size_t i = 0; i < 400; ++i) mask.pixels[i] = 0.0f;
+    write_image(file("mask.png"), mask);
+    write_colored_kettle(file("kettle.glb"));
     const std::string layer = "lora_unet_up_blocks_3_attentions_2_transformer_blocks_0_attn1_to_q";
     write_safetensors(file("lora.safetensors"), {{layer + ".lora_down.weight", {1, 32}, 1.0f},
                                                  {layer + ".lora_up.weight", {32, 1}, 1.0f},
@@ -75,8 +80,20 @@ class Rerun : public testing::Test {
   }
   static void TearDownTestSuite() { delete folder_; }
 
-  static fs::path kettle() {
+  static fs::path example() {
     return test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+  }
+  static fs::path kettle() { return file("kettle.glb"); }
+  // The example with vertex colours: its normals, taken as such.
+  static void write_colored_kettle(const fs::path& path) {
+    const std::vector<uint8_t> bytes = read_file(example());
+    uint32_t length = 0;
+    std::memcpy(&length, bytes.data() + 12, sizeof length);
+    json gltf = json::parse(bytes.begin() + 20, bytes.begin() + 20 + length);
+    for (json& mesh : gltf["meshes"])
+      for (json& primitive : mesh["primitives"])
+        primitive["attributes"]["COLOR_0"] = primitive["attributes"]["NORMAL"];
+    write_file(path, asset::glb_bytes(gltf.dump(), std::span(bytes).subspan(20 + length + 8), path.string()));
   }
   static fs::path file(const std::string& name) { return folder_->path() / name; }
 

@@ -17,6 +17,7 @@ enum class RandomPurpose : uint32_t {
   kSchedulerNoise = 4,
   kLightCache = 5,
   kGBuffer = 7,
+  kMasks = 8,
   kTest = 100,
 };
 

@@ -3,21 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patina/asset/texel_raster.h"
 #include "patina/base/parallel.h"
+#include "patina/views/strength_views.h"
 
 namespace patina::inverse {
 namespace {
-
-// `map`'s layout with width × height texels: only size and wrap modes matter to a look-up.
-asset::Map layout(const asset::Map& map, int width, int height) {
-  asset::Map out;
-  out.uv_set = map.uv_set;
-  out.uv_transform = map.uv_transform;
-  out.wrap_s = map.wrap_s;
-  out.wrap_t = map.wrap_t;
-  out.texels = Image(width, height, 1);
-  return out;
-}
 
 float cross2(const vec2& a, const vec2& b) {
   return a.x * b.y - a.y * b.x;
@@ -81,7 +72,7 @@ std::vector<SeenPoint> trace_seen_points(const render::Scene& scene, const views
 
 Image evidence_of(const asset::Map& map, int width, int height, asset::MapSlot slot, int material,
                   std::span<const SeenPoint> points) {
-  asset::Map evidence = layout(map, width, height);
+  asset::Map evidence = asset::blank_map(map, width, height);
   for (const SeenPoint& seen : points) {
     if (seen.point.material != material) continue;
     const asset::BilinearTap tap = asset::bilinear_tap(evidence, seen.point.uv[index_of(slot)]);
@@ -93,57 +84,14 @@ Image evidence_of(const asset::Map& map, int width, int height, asset::MapSlot s
 
 SurfaceTexels surface_texels(const render::Scene& scene, const asset::Map& map, int width, int height,
                              int material) {
-  const asset::Map target = layout(map, width, height);
   SurfaceTexels surface{Image(width, height, 1), {}};
   surface.p_world.assign(surface.covered.num_pixels(), vec3(0.0f));
-  const auto set = static_cast<size_t>(map.uv_set);
-  const vec2 size(static_cast<float>(width), static_cast<float>(height));
-  for (int p = 0; p < scene.num_asset_primitives(); ++p) {
-    const asset::Primitive& primitive = *scene.primitives()[static_cast<size_t>(p)];
-    if (primitive.material != material || set >= primitive.uv.size() || primitive.uv[set].empty()) continue;
-    for (const uvec3& triangle : primitive.triangles) {
-      // Texel coordinates with centres at whole numbers; a texel counts if its centre is within half a texel
-      // of the triangle.
-      const vec2 a = asset::map_uv(map, primitive.uv[set][triangle.x]) * size - 0.5f;
-      const vec2 b = asset::map_uv(map, primitive.uv[set][triangle.y]) * size - 0.5f;
-      const vec2 c = asset::map_uv(map, primitive.uv[set][triangle.z]) * size - 0.5f;
-      const vec3 &p_a = primitive.p_world[triangle.x], &p_b = primitive.p_world[triangle.y],
-                 &p_c = primitive.p_world[triangle.z];
-      const vec2 low = glm::floor(glm::min(a, glm::min(b, c)) - 0.5f),
-                 high = glm::ceil(glm::max(a, glm::max(b, c)) + 0.5f);
-      // A triangle that spans the whole texture several times over covers every texel.
-      if (!(high.x - low.x < 4.0f * size.x && high.y - low.y < 4.0f * size.y)) {
-        for (size_t i = 0; i < surface.p_world.size(); ++i)
-          if (surface.covered.pixels[i] <= 0.0f) surface.p_world[i] = (p_a + p_b + p_c) / 3.0f;
-        std::fill(surface.covered.pixels.begin(), surface.covered.pixels.end(), 1.0f);
-        return surface;
-      }
-      const float area = cross2(b - a, c - a);
-      const float sign = area < 0.0f ? -1.0f : 1.0f;
-      // Twice the signed area between an edge and a texel's centre; the edge may be missed by half a texel.
-      const auto beside = [&](const vec2& from, const vec2& to, const vec2& q) {
-        return sign * cross2(to - from, q - from);
-      };
-      const auto reach = [](const vec2& from, const vec2& to) {
-        return 0.5f * (std::abs(to.x - from.x) + std::abs(to.y - from.y));
-      };
-      for (float y = low.y; y <= high.y; y += 1.0f)
-        for (float x = low.x; x <= high.x; x += 1.0f) {
-          const vec2 q(x, y);
-          vec3 share(beside(b, c, q), beside(c, a, q), beside(a, b, q));
-          if (share.x < -reach(b, c) || share.y < -reach(c, a) || share.z < -reach(a, b)) continue;
-          const asset::BilinearTap tap = asset::bilinear_tap(target, (q + 0.5f) / size);
-          const auto nearest = static_cast<size_t>(std::max_element(tap.weight.begin(), tap.weight.end()) -
-                                                   tap.weight.begin());
-          const auto texel = static_cast<size_t>(tap.texel[nearest]);
-          surface.covered.pixels[texel] = 1.0f;
-          share = glm::max(share, 0.0f);
-          const float total = share.x + share.y + share.z;
-          surface.p_world[texel] =
-              total > 0.0f ? (share.x * p_a + share.y * p_b + share.z * p_c) / total : p_a;
-        }
-    }
-  }
+  asset::each_touched_texel(views::asset_primitives(scene), asset::blank_map(map, width, height), material,
+                            [&](const asset::TouchedTexel& touched) {
+                              surface.covered.pixels[touched.texel] = 1.0f;
+                              surface.p_world[touched.texel] =
+                                  touched.interpolated(touched.primitive->p_world);
+                            });
   return surface;
 }
 

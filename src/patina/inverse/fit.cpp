@@ -163,7 +163,7 @@ void Fit::choose_best() {
 }
 
 FitResult Fit::take_result() {
-  FitResult result = result_of(scene_, state_, base_, options_.fill_unseen);
+  FitResult result = result_of(scene_, state_, base_, inputs_.strength, options_.fill_unseen);
   result.psnr = psnr_;
   return result;
 }

@@ -15,11 +15,14 @@ struct ViewSet;
 
 namespace patina::inverse {
 
-/// What a fit works on. Refers to the views and the images.
+/// What a fit works on. Refers to the views, the images and the strengths.
 struct FitInputs {
   const views::ViewSet& views;    // renders of the materials as they are
   std::span<const Image> edited;  // what the views shall look like: one sRGB [H,W,3] in [0,1] a view
   std::vector<bool> materials{};  // which materials may change; empty: all of the asset
+  // How strongly, one map a material (asset/strength_map.h): texels at zero keep their value. Empty:
+  // everything may change.
+  std::span<const asset::Map> strength{};
 };
 
 /// FitOptions::texture_size: a power of two that keeps what the views resolve, never below the asset's own.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "patina/asset/texel_raster.h"
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
 
@@ -55,7 +56,7 @@ std::vector<asset::MaterialMaps> apply_changes(const std::vector<asset::Material
   std::vector<asset::MaterialMaps> maps = base;
   for (const FittedMap& map : fitted) {
     asset::Map change = map.field.delta;
-    if (padding == Padding::kIslands) change.texels = dilated(change, map.evidence, kPaddingTexels);
+    if (padding == Padding::kIslands) change.texels = asset::dilated(change, map.evidence, kPaddingTexels);
     for (size_t i = 0; i < map.may_change.pixels.size(); ++i)
       if (map.may_change.pixels[i] <= 0.0f)
         std::fill_n(change.texels.pixels.begin() + static_cast<std::ptrdiff_t>(i) * change.texels.channels,

@@ -188,44 +188,4 @@ void adam_step(TextureField& field, const std::vector<Image>& gradients, int fin
   compose(field);
 }
 
-Image dilated(const asset::Map& map, const Image& valid, int radius) {
-  const Image& in = map.texels;
-  PATINA_CHECK(valid.width == in.width && valid.height == in.height && valid.channels == 1);
-  Image out = in;
-  std::vector<uint8_t> known(valid.pixels.size());
-  for (size_t i = 0; i < known.size(); ++i) {
-    known[i] = valid.pixels[i] > 0.0f;
-    if (!known[i])
-      std::fill_n(out.pixels.begin() + static_cast<std::ptrdiff_t>(i) * out.channels, out.channels, 0.0f);
-  }
-  const auto neighbour = [&](int x, int y) {
-    return static_cast<size_t>(asset::texel_index(y, in.height, map.wrap_t)) * static_cast<size_t>(in.width) +
-           static_cast<size_t>(asset::texel_index(x, in.width, map.wrap_s));
-  };
-  for (int ring = 0; ring < radius; ++ring) {
-    std::vector<size_t> filled;
-    for (int y = 0; y < in.height; ++y)
-      for (int x = 0; x < in.width; ++x) {
-        const size_t i = static_cast<size_t>(y) * static_cast<size_t>(in.width) + static_cast<size_t>(x);
-        if (known[i]) continue;
-        float* texel = out.at(x, y);
-        float num_known = 0;
-        for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx) {
-            const size_t j = neighbour(x + dx, y + dy);
-            if (!known[j]) continue;
-            num_known += 1.0f;
-            for (int c = 0; c < out.channels; ++c)
-              texel[c] += out.pixels[j * static_cast<size_t>(out.channels) + static_cast<size_t>(c)];
-          }
-        if (num_known == 0.0f) continue;
-        for (int c = 0; c < out.channels; ++c) texel[c] /= num_known;
-        filled.push_back(i);
-      }
-    if (filled.empty()) break;
-    for (const size_t i : filled) known[i] = 1;
-  }
-  return out;
-}
-
 }  // namespace patina::inverse

@@ -46,8 +46,4 @@ struct AdamOptions {
 void adam_step(TextureField& field, const std::vector<Image>& gradients, int finest,
                const AdamOptions& options);
 
-/// Values of texels where `valid` [h,w,1] is not positive, filled from the neighbours that have one, ring by
-/// ring up to `radius` texels; farther ones become zero. Wraps as the map does.
-Image dilated(const asset::Map& map, const Image& valid, int radius);
-
 }  // namespace patina::inverse

@@ -197,10 +197,11 @@ void check_asset_and_point(const Config& config, const AblationOptions& options,
 // on. Asset and G-buffers go when this returns, so that they do not count as another stage's memory.
 void edit(std::span<Run> runs, std::string_view told_as, size_t first, size_t count, ResolvedModel& model,
           const RunProgress& progress) {
-  const Workbench bench = open_workbench(runs[0].step.config.inputs, progress);
+  Workbench bench = open_workbench(runs[0].step.config.inputs, progress);
+  mask_stage(bench, runs[0].step.config.masks, *runs[0].folder, progress);
   const RenderedViews views = render_stage(bench, runs[0].step.config.render, *runs[0].folder, progress);
   for (size_t i = 0; i < runs.size(); ++i) {
-    runs[i].folder->adopt_stage(*runs[0].folder, "render");
+    for (const char* stage : {"masks", "render"}) runs[i].folder->adopt_stage(*runs[0].folder, stage);
     edit_stage(bench, views, runs[i].step.config.edit, model, *runs[i].folder,
                of_all_steps(progress, "detail", first + i, count, told_as));
   }
@@ -287,7 +288,8 @@ json ablate(Config config, const AblationOptions& options, const fs::path& folde
     edit({&more_runs[i], 1}, "more views", i, more_runs.size(), model, once);
   model.unload();
 
-  const Workbench bench = open_workbench(runs[0].step.config.inputs, once);
+  Workbench bench = open_workbench(runs[0].step.config.inputs, once);
+  mask_stage(bench, runs[0].step.config.masks, *runs[0].folder, once);
   const RenderedViews views = load_views(bench, *runs[0].folder);
   for (size_t i = 0; i < runs.size(); ++i) {
     const std::vector<Image> edited = load_edited(views, *runs[i].folder);

@@ -34,6 +34,7 @@ struct Config {
   bool keep = false;             // what was changed by hand in the run folder stays when its stage runs again
 
   InputSettings inputs;
+  MaskSettings masks;
   RenderSettings render;
   EditSettings edit;
   FitSettings fit;

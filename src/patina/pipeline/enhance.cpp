@@ -31,8 +31,9 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   check_inputs(config);
   ResolvedModel model(config.edit);
   write_config(config, run);
-  const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
+  Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
   check_export(bench, config.output, progress);
+  mask_stage(bench, config.masks, run, progress);                                 // → masks/
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
   const std::vector<Image> edited = edit_stage(bench, views, config.edit, model, run, progress);  // → detail/
   model.unload();
@@ -54,7 +55,8 @@ void run_edit(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   ResolvedModel model(config.edit);
   write_config(config, run);
-  const Workbench bench = open_workbench(config.inputs, progress);
+  Workbench bench = open_workbench(config.inputs, progress);
+  mask_stage(bench, config.masks, run, progress);
   edit_stage(bench, load_views(bench, run), config.edit, model, run, progress);
 }
 
@@ -62,8 +64,9 @@ void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   check_output(config.output);
   write_config(config, run);
-  const Workbench bench = open_workbench(config.inputs, progress);
+  Workbench bench = open_workbench(config.inputs, progress);
   check_export(bench, config.output, progress);
+  mask_stage(bench, config.masks, run, progress);
   const RenderedViews views = load_views(bench, run);
   const std::vector<Image> edited = load_edited(views, run);
   write_output(bench, fit_stage(bench, views, edited, config.fit, run, progress), config.output);
@@ -72,7 +75,8 @@ void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
 void run_report(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   write_config(config, run);
-  const Workbench bench = open_workbench(config.inputs, progress);
+  Workbench bench = open_workbench(config.inputs, progress);
+  mask_stage(bench, config.masks, run, progress);
   const RenderedViews views = load_views(bench, run);
   report_stage(bench, views, load_edited(views, run), load_fitted(bench, run), config.report, run, progress);
 }

@@ -9,6 +9,7 @@ namespace patina::pipeline {
 
 Option preset_option();
 std::vector<Option> edit_options();
+std::vector<Option> mask_options();
 std::vector<Option> prior_options();
 std::vector<Option> model_options();
 std::vector<Option> input_output_options();

@@ -16,8 +16,8 @@ using nlohmann::json;
 
 std::vector<Option> make_options() {
   std::vector<Option> list{preset_option()};
-  for (auto* group : {edit_options, input_output_options, model_options, view_options, prior_options,
-                      fit_options, machine_options})
+  for (auto* group : {edit_options, mask_options, input_output_options, model_options, view_options,
+                      prior_options, fit_options, machine_options})
     for (Option& option : group()) list.push_back(std::move(option));
   return list;
 }

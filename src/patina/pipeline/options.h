@@ -24,7 +24,8 @@ enum Part : unsigned {
   kReport = 16,
   kOutput = 32,   // the enhanced asset
   kMachine = 64,  // every command
-  kEverything = 127,
+  kMasks = 128,   // where the asset may change
+  kEverything = 255,
 };
 
 /// How a text becomes a typed value.

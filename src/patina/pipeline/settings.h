@@ -5,10 +5,13 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "patina/correspond/noise.h"
 #include "patina/diffusion/options.h"
 #include "patina/inverse/fit_options.h"
+#include "patina/masks/places.h"
 
 namespace patina::pipeline {
 
@@ -17,6 +20,16 @@ struct RenderSettings {
   int max_depth = 6;                 // bounces of the longest path
   std::optional<float> exposure_ev;  // nullopt: automatic
   uint64_t seed = 0;
+};
+
+/// Where the asset may change, and how much there.
+struct MaskSettings {
+  std::vector<std::string> files;    // pictures: "FILE" for all materials that may change, or "MATERIAL=FILE"
+  bool vertex_color = false;         // the mesh's own vertex colours too
+  std::vector<std::string> protect;  // names of materials that keep every pixel and texel
+  std::vector<masks::PlaceAmount> where;  // what the asset's shape is like there; the largest counts
+
+  bool any() const { return !files.empty() || vertex_color || !protect.empty() || !where.empty(); }
 };
 
 struct EditSettings {

@@ -22,7 +22,12 @@ namespace {
 
 std::string edit_key(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
                      const ResolvedModel& model) {
-  return StageKey(bench, settings).add(views.tile).add(views.normal).add(model.hash()).hash();
+  return StageKey(bench, settings)
+      .add(views.tile)
+      .add(views.normal)
+      .add_strength(bench)
+      .add(model.hash())
+      .hash();
 }
 
 // The view whose noise is farthest from white tells whether the noise can be trusted.
@@ -45,6 +50,40 @@ json noise_metrics(const correspond::NoiseField& noise, int grid) {
 void restore_surroundings(Image& edited, const Image& render, const std::vector<float>& coverage) {
   for (size_t i = 0; i < coverage.size(); ++i)
     if (coverage[i] == 0) std::copy_n(&render.pixels[3 * i], 3, &edited.pixels[3 * i]);
+}
+
+// Where the strength is zero nothing may change either. Latent pixels are coarser than that: inside one, the
+// edit comes in as the strength of a pixel against the largest around it, so that grey stays smooth and a
+// border in the mask stays where it was painted.
+void restore_masked(Image& edited, const Image& render, const Image& strength, int latent_scale) {
+  const int radius = latent_scale / 2;
+  const auto largest = [&](const Image& in, ivec2 axis) {
+    Image out = in;
+    for (int y = 0; y < in.height; ++y)
+      for (int x = 0; x < in.width; ++x)
+        for (int k = -radius; k <= radius; ++k) {
+          const int u = std::clamp(x + k * axis.x, 0, in.width - 1),
+                    v = std::clamp(y + k * axis.y, 0, in.height - 1);
+          *out.at(x, y) = std::max(*out.at(x, y), *in.at(u, v));
+        }
+    return out;
+  };
+  const Image around = largest(largest(strength, {1, 0}), {0, 1});
+  for (size_t i = 0; i < strength.pixels.size(); ++i) {
+    const float own = strength.pixels[i];
+    if (own < 0) continue;  // nothing of the asset
+    if (own == around.pixels[i] && own > 0) continue;
+    const float share = own > 0 ? own / around.pixels[i] : 0.0f;
+    for (size_t c = 3 * i; c < 3 * i + 3; ++c)
+      edited.pixels[c] = render.pixels[c] + share * (edited.pixels[c] - render.pixels[c]);
+  }
+}
+
+// Strengths as a grey picture in which only exact zeros are black; what shows nothing of the asset is black
+// too.
+Image strength_picture(Image strength) {
+  for (float& value : strength.pixels) value = value > 0 ? std::max(value, 1.0f / 255) : 0.0f;
+  return strength;
 }
 
 double megabytes(int64_t bytes) {
@@ -89,7 +128,8 @@ PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, co
                      .tile_views = views.tile,
                      .normal_views = views.normal,
                      .noise = std::move(noise),
-                     .bias_levels = {}};
+                     .bias_levels = {},
+                     .strength_views = bench.strength.views};
   if (settings.options.bias_weight != 0) {
     start = Clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
@@ -125,8 +165,14 @@ std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {
       restore_surroundings(edited[v], views.tile[v], views.set.views[v].gbuffer.coverage);
+      if (!bench.strength.views.empty())
+        restore_masked(edited[v], views.tile[v], bench.strength.views[v], model.latent_scale());
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
+    }
+    for (size_t v = 0; v < bench.strength.views.size(); ++v) {
+      result.outputs.push_back(numbered("detail/strength", v, ".png"));
+      write_image(run.file(result.outputs.back()), strength_picture(bench.strength.views[v]));
     }
     const diffusion::Guidance guidance = diffusion::guidance_of(model, options);
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model.latent_channels());

@@ -1,7 +1,9 @@
 // The third stage: inverse rendering carries the edit into the texture maps.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
+#include <cmath>
 
 #include "patina/asset/map_slots.h"
 #include "patina/base/error.h"
@@ -21,15 +23,6 @@ namespace {
 // Below this many texels a pixel a note says that a larger texture would hold more.
 constexpr float kTooCoarse = 0.5f;
 
-// A material's name as part of a file name: letters, digits, '-', '_'; numbered, so that two materials never
-// share a file.
-std::string texture_file(const char* folder, size_t material, const std::string& name, const char* slot) {
-  std::string safe;
-  for (const char c : name.substr(0, 40))
-    safe += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '_';
-  return fmt::format("{}/{:02}_{}_{}.png", folder, material, safe, slot);
-}
-
 // Where the stage's outputs go, and what a fit shows before it is done: never over the outputs of a run with
 // other options, to which the user may come back.
 constexpr const char *kFolder = "textures", *kPreviewFolder = "preview";
@@ -45,7 +38,7 @@ WrittenMaps write_maps(const inverse::FitResult& fitted, const Workbench& bench,
   for (size_t m = 0; m < fitted.maps.size(); ++m)
     for (const asset::MapSlotRow& slot : asset::kMapSlots) {
       if (!has(fitted.changed[m], slot.slot)) continue;
-      const std::string file = texture_file(folder, m, bench.maps[m].name, slot.name);
+      const std::string file = material_file(folder, m, bench.maps[m].name, slot.name);
       write_image(run.file(file),
                   asset::picture_of(slot_map(fitted.maps[m], slot.slot).texels, slot.encoding));
       written.files.push_back(file);
@@ -54,12 +47,42 @@ WrittenMaps write_maps(const inverse::FitResult& fitted, const Workbench& bench,
   return written;
 }
 
+// Files hold eight bits a channel. A texel that its file shows as the asset came is so to the last bit.
+// Returns whether any texel differs.
+bool restore_untouched(Image& texels, const Image& picture, const Image& before,
+                       asset::MapEncoding encoding) {
+  if (texels.width != before.width || texels.height != before.height) return true;
+  const Image old = asset::picture_of(before, encoding);
+  const auto channels = static_cast<size_t>(texels.channels);
+  bool any = false;
+  for (size_t i = 0; i < texels.pixels.size(); i += channels) {
+    bool same = true;
+    for (size_t c = i; c < i + channels; ++c)
+      same &= std::abs(picture.pixels[c] * 255.0f - std::round(old.pixels[c] * 255.0f)) < 1e-3f;
+    any |= !same;
+    if (same) std::copy_n(&before.pixels[i], channels, &texels.pixels[i]);
+  }
+  return any;
+}
+
 std::string fit_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
                     const FitSettings& settings) {
-  return StageKey(bench, settings).add_materials(bench).add(views.set.exposure_ev).add(edited).hash();
+  return StageKey(bench, settings)
+      .add_materials(bench)
+      .add_strength(bench)
+      .add(views.set.exposure_ev)
+      .add(edited)
+      .hash();
 }
 
 }  // namespace
+
+std::string material_file(const char* folder, size_t material, const std::string& name, const char* what) {
+  std::string safe;
+  for (const char c : name.substr(0, 40))
+    safe += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '_';
+  return fmt::format("{}/{:02}_{}_{}.png", folder, material, safe, what);
+}
 
 FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
                           const FitSettings& settings, RunFolder& run, const RunProgress& progress) {
@@ -85,8 +108,9 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
       (void)write_maps(so_far, bench, run, kPreviewFolder);
     };
-    const inverse::FitResult fitted = inverse::fit_materials(
-        *bench.scene, {views.set, edited, bench.enhanced}, settings.options, hooks, progress);
+    const inverse::FitResult fitted =
+        inverse::fit_materials(*bench.scene, {views.set, edited, bench.enhanced, bench.strength.maps},
+                               settings.options, hooks, progress);
 
     RunFolder::StageResult result;
     WrittenMaps written = write_maps(fitted, bench, run, kFolder);
@@ -135,8 +159,11 @@ FittedMaterials load_fitted(const Workbench& bench, const RunFolder& run) {
       for (int c = 0; c < channels; ++c)
         picture.pixels[static_cast<size_t>(channels) * i + static_cast<size_t>(c)] =
             stored.pixels[static_cast<size_t>(stored.channels) * i + static_cast<size_t>(c)];
-    slot_map(fitted.maps[m], slot->slot).texels = asset::texels_of(picture, slot->encoding);
-    fitted.changed[m].set(index_of(slot->slot));
+    Image& texels = slot_map(fitted.maps[m], slot->slot).texels;
+    texels = asset::texels_of(picture, slot->encoding);
+    const Image& before = slot_map(bench.maps[m], slot->slot).texels;
+    if (restore_untouched(texels, picture, before, slot->encoding))
+      fitted.changed[m].set(index_of(slot->slot));
   }
   return fitted;
 }

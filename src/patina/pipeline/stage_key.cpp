@@ -85,6 +85,16 @@ void visit(const RenderSettings& s, Visitor& visitor) {
   visitor(samples_per_pixel, max_depth, exposure_ev, seed);
 }
 template <class Visitor>
+void visit(const masks::PlaceAmount& s, Visitor& visitor) {
+  const auto& [place, amount] = s;
+  visitor(place, amount);
+}
+template <class Visitor>
+void visit(const MaskSettings& s, Visitor& visitor) {
+  const auto& [files, vertex_color, protect, where] = s;
+  visitor(files, vertex_color, protect, where);
+}
+template <class Visitor>
 void visit(const EditSettings& s, Visitor& visitor) {
   const auto& [model, dtype, device, low_memory, noise, options] = s;
   visitor(model, dtype, device, low_memory, noise, options);
@@ -110,6 +120,9 @@ std::string fields_of(const Settings& settings) {
 }  // namespace
 
 std::string text_of(const RenderSettings& settings) {
+  return fields_of(settings);
+}
+std::string text_of(const MaskSettings& settings) {
   return fields_of(settings);
 }
 std::string text_of(const EditSettings& settings) {
@@ -152,6 +165,11 @@ StageKey& StageKey::add_materials(const Workbench& bench) {
   std::string text;
   for (const bool enhanced : bench.enhanced) text += enhanced ? '1' : '0';
   return add(text);
+}
+
+StageKey& StageKey::add_strength(const Workbench& bench) {
+  for (const asset::Map& map : bench.strength.maps) add(map.texels);
+  return *this;
 }
 
 std::string StageKey::hash() const {

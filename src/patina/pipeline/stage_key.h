@@ -15,6 +15,7 @@ namespace patina::pipeline {
 
 /// A text of every field's value. Equal for equal settings, different for different ones.
 std::string text_of(const RenderSettings& settings);
+std::string text_of(const MaskSettings& settings);
 std::string text_of(const EditSettings& settings);
 std::string text_of(const FitSettings& settings);
 std::string text_of(const ReportSettings& settings);
@@ -32,6 +33,8 @@ class StageKey {
   StageKey& add(float number);
   StageKey& add(const Image& image);
   StageKey& add(std::span<const Image> images);
+  /// How strongly each texel may change: nothing where there are no masks.
+  StageKey& add_strength(const Workbench& bench);
   /// Which materials may change: read by the stages that look at the enhanced surface alone.
   StageKey& add_materials(const Workbench& bench);
 

@@ -24,6 +24,12 @@ struct RenderedViews {
   std::vector<Image> normal;  // [H,W,3] in the protocol of ControlNet normalbae
 };
 
+/// Combines the masks into strengths → masks/NN_<material>.png, one grey picture a material that has some,
+/// and sets bench.strength and, where a material keeps every texel, bench.enhanced. Does nothing without
+/// masks. Throws Error for materials that the asset does not have, pictures that are no masks, and masks that
+/// leave nothing to change or nothing that a camera sees.
+void mask_stage(Workbench& bench, const MaskSettings& settings, RunFolder& run, const RunProgress& progress);
+
 /// Renders the views → views/tile_NN.png, views/normal_NN.png, views/radiance_NN.exr, views/cameras.json.
 RenderedViews render_stage(const Workbench& bench, const RenderSettings& settings, RunFolder& run,
                            const RunProgress& progress);
@@ -38,7 +44,8 @@ struct PreparedEdit {
 PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
                           const diffusion::Model& model, const RunProgress& progress);
 
-/// Lets the diffusion model edit the views → detail/edited_NN.png. Loads the model where it is needed.
+/// Lets the diffusion model edit the views → detail/edited_NN.png; with masks also their strengths there,
+/// detail/strength_NN.png. Loads the model where it is needed.
 std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views,
                               const EditSettings& settings, ResolvedModel& model, RunFolder& run,
                               const RunProgress& progress);
@@ -74,6 +81,10 @@ Prompts prompts_of(const RunFolder& run);
 /// A picture of a run folder as [height,width,3]; an alpha channel that a paint program added is dropped.
 /// Throws Error{kFormat} on another size.
 Image read_rgb_sized(const std::filesystem::path& path, int width, int height);
+
+/// Path of a material's picture: "textures/00_steel_normal.png". Letters, digits, '-' and '_' of its name,
+/// numbered, so that two materials never share a file.
+std::string material_file(const char* folder, size_t material, const std::string& name, const char* what);
 
 /// Path of file number `index` of a stage: "views/tile_03.png".
 std::string numbered(std::string_view prefix, size_t index, std::string_view extension);

@@ -75,19 +75,26 @@ std::string quoted_names(const std::vector<asset::Material>& materials) {
 // Marks the used materials of that name. A name that no material has and that holds commas is a list of
 // names.
 void mark_named(const asset::Asset& asset, const std::vector<bool>& used, const std::string& name,
-                std::vector<bool>& wanted) {
+                const char* option, std::vector<bool>& wanted) {
   bool found = false;
   for (size_t m = 0; m < asset.materials.size(); ++m)
     if (used[m] && asset.materials[m].name == name) wanted[m] = found = true;
   if (found) return;
   if (const size_t comma = name.find(','); comma != std::string::npos) {
-    mark_named(asset, used, name.substr(0, comma), wanted);
-    mark_named(asset, used, name.substr(comma + 1), wanted);
+    mark_named(asset, used, name.substr(0, comma), option, wanted);
+    mark_named(asset, used, name.substr(comma + 1), option, wanted);
     return;
   }
-  throw Error(ErrorCode::kUsage, "material",
+  throw Error(ErrorCode::kUsage, option,
               fmt::format("'{}' has no material named '{}'; it has {}", asset.path.string(), printable(name),
                           quoted_names(asset.materials)));
+}
+
+std::vector<bool> used_materials(const asset::Asset& asset) {
+  std::vector<bool> used(asset.materials.size(), false);
+  for (const asset::Primitive& primitive : asset.primitives)
+    used[static_cast<size_t>(primitive.material)] = true;
+  return used;
 }
 
 // Which materials may change: those asked for, or all, that some triangle uses and that have UVs to carry
@@ -95,16 +102,8 @@ void mark_named(const asset::Asset& asset, const std::vector<bool>& used, const 
 std::vector<bool> choose_materials(const asset::Asset& asset, const std::vector<std::string>& names,
                                    std::vector<std::string>& warnings) {
   const size_t num_materials = asset.materials.size();
-  std::vector<bool> used(num_materials, false);
-  for (const asset::Primitive& primitive : asset.primitives)
-    used[static_cast<size_t>(primitive.material)] = true;
-
-  std::vector<bool> wanted = used;
-  if (!names.empty()) {
-    wanted.assign(num_materials, false);
-    for (const std::string& name : names) mark_named(asset, used, name, wanted);
-  }
-
+  std::vector<bool> wanted =
+      names.empty() ? used_materials(asset) : named_materials(asset, names, "material");
   const std::vector<asset::UvState> states = asset::uv_states(asset);
   for (size_t m = 0; m < num_materials; ++m) {
     if (!wanted[m]) continue;
@@ -157,6 +156,14 @@ render::Environment open_environment(const std::filesystem::path& path, std::vec
 }
 
 }  // namespace
+
+std::vector<bool> named_materials(const asset::Asset& asset, const std::vector<std::string>& names,
+                                  const char* option) {
+  const std::vector<bool> used = used_materials(asset);
+  std::vector<bool> wanted(asset.materials.size(), false);
+  for (const std::string& name : names) mark_named(asset, used, name, option, wanted);
+  return wanted;
+}
 
 Workbench open_workbench(const InputSettings& inputs, const Progress& progress) {
   Workbench bench;

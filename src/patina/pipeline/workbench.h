@@ -18,11 +18,18 @@
 
 namespace patina::pipeline {
 
+/// How strongly the surface may change (asset/strength_map.h); empty without masks: fully, everywhere.
+struct Strength {
+  std::vector<asset::Map> maps;  // one a material of the asset
+  std::vector<Image> views;      // one a camera, [H,W,1] (views/strength_views.h)
+};
+
 struct Workbench {
   asset::Asset asset;
   std::unique_ptr<asset::Asset> context;  // null: none
   std::vector<asset::MaterialMaps> maps;  // the asset's own, one a material
   std::vector<bool> enhanced;             // one a material: may it change
+  Strength strength;                      // set by mask_stage
   std::unique_ptr<render::Scene> scene;   // with `maps`
   std::vector<render::Camera> cameras;
   std::vector<std::string> warnings;  // what will not come out well, for the report
@@ -33,6 +40,11 @@ struct Workbench {
 /// used, for an asset without usable UVs, and for material names that it does not have (listing those it
 /// has). Warns of what will not come out well.
 Workbench open_workbench(const InputSettings& inputs, const Progress& progress);
+
+/// Which of the asset's materials have these names. Throws Error{kUsage}, `option` as context, for a name
+/// that no mesh part's material has (listing those there are).
+std::vector<bool> named_materials(const asset::Asset& asset, const std::vector<std::string>& names,
+                                  const char* option);
 
 /// Cameras as JSON, relative to the asset's origin: {"cameras": [{"world_from_camera": 16 numbers column by
 /// column, "fov_degrees", "width", "height"}], ...}.

@@ -1,0 +1,157 @@
+#include "patina/masks/places.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "patina/asset/texel_raster.h"
+#include "patina/base/parallel.h"
+#include "patina/base/random.h"
+#include "patina/masks/padding.h"
+#include "patina/masks/surface_shape.h"
+#include "patina/views/strength_views.h"
+
+namespace patina::masks {
+namespace {
+
+// Lengths as shares of the asset's radius.
+constexpr float kEdgeWidth = 0.04f, kCavityDepth = 0.5f, kStreakLength = 0.6f, kStreakWidth = 0.03f,
+                kStreakStep = 0.02f;
+constexpr uint64_t kSeed = 0;  // masks do not depend on the run's seed: a repainted one stays right
+
+float smoothstep(float low, float high, float x) {
+  const float t = std::clamp((x - low) / (high - low), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
+}
+
+// The point of the surface that a texel shows.
+struct SurfaceTexel {
+  size_t texel = 0;
+  render::Hit hit;
+};
+
+std::vector<SurfaceTexel> surface_of(const render::Scene& scene, const asset::Map& map, int material) {
+  std::vector<SurfaceTexel> all(map.texels.num_pixels());
+  std::vector<bool> seen(all.size());
+  asset::each_touched_texel(
+      views::asset_primitives(scene), map, material, [&](const asset::TouchedTexel& touched) {
+        if (seen[touched.texel] && !touched.inside) return;
+        all[touched.texel] = {touched.texel,
+                              {.primitive = touched.primitive_index,
+                               .triangle = touched.triangle,
+                               .barycentric = {touched.barycentric.y, touched.barycentric.z}}};
+        seen[touched.texel] = true;
+      });
+  std::erase_if(all, [&, i = size_t{0}](const SurfaceTexel&) mutable { return !seen[i++]; });
+  return all;
+}
+
+// The point of a hit as a ray from its front meets it.
+render::SurfacePoint front_of(const render::Scene& scene, const render::Hit& hit) {
+  const asset::Primitive& primitive = *scene.primitives()[hit.primitive];
+  const uvec3& corner = primitive.triangles[hit.triangle];
+  const auto& p = primitive.p_world;
+  const vec3 cross = glm::cross(p[corner.y] - p[corner.x], p[corner.z] - p[corner.x]);
+  const float length = glm::length(cross);
+  render::Ray ray;
+  ray.direction = length > 0.0f ? -cross / length : vec3(0, -1, 0);
+  return scene.surface(ray, hit);
+}
+
+// Smooth noise in [0,1] over a horizontal plane, one random value a unit cell.
+float cell_noise(const vec2& at) {
+  const vec2 low = glm::floor(at);
+  const vec2 t = at - low;
+  const vec2 s = t * t * (3.0f - 2.0f * t);
+  const auto value = [&](int dx, int dy) {
+    const auto x = static_cast<uint32_t>(static_cast<int>(low.x) + dx),
+               y = static_cast<uint32_t>(static_cast<int>(low.y) + dy);
+    return RandomStream(kSeed, RandomPurpose::kMasks, static_cast<uint64_t>(x) << 32 | y, 1).uniform();
+  };
+  return glm::mix(glm::mix(value(0, 0), value(1, 0), s.x), glm::mix(value(0, 1), value(1, 1), s.x), s.y);
+}
+
+// Walks up the surface until it ends, turns flat or is closed off. Whether and how strongly a streak runs
+// down from there is up to the place where the walk ends, so that all points below it agree.
+float drip_at(const render::Scene& scene, render::SurfacePoint point, float radius) {
+  constexpr float kFlat = 0.8f;  // of the normal's height: water rests there
+  const float step = kStreakStep * radius;
+  if (std::abs(point.n_geometric.y) > kFlat) return 0.0f;
+  float walked = 0;
+  while (walked < kStreakLength * radius) {
+    const vec3 n = point.n_geometric;
+    const vec3 up = glm::normalize(vec3(0, 1, 0) - n.y * n);
+    render::Ray ray;
+    ray.origin = point.p_world + step * (up + n);
+    ray.direction = -n;
+    ray.t_max = 2.0f * step;
+    const auto hit = scene.intersect(ray);
+    if (!hit || static_cast<int>(hit->primitive) >= scene.num_asset_primitives()) break;
+    const render::SurfacePoint next = scene.surface(ray, *hit);
+    if (next.n_geometric.y > kFlat || glm::dot(next.n_geometric, n) < 0.2f) break;
+    point = next;
+    walked += step;
+  }
+  const vec2 source = vec2(point.p_world.x, point.p_world.z) / (kStreakWidth * radius);
+  const float length = kStreakLength * radius * cell_noise(source + vec2(1000.0f));
+  if (!(walked < length)) return 0.0f;
+  return smoothstep(0.45f, 0.75f, cell_noise(source)) * (1.0f - walked / length);
+}
+
+float value_at(const render::Scene& scene, const SurfaceTexel& texel, Place place, float radius) {
+  const render::SurfacePoint point = front_of(scene, texel.hit);
+  const ShapeRays rays{.count = 32, .seed = kSeed, .index = texel.texel};
+  const float width = kEdgeWidth * radius;
+  switch (place) {
+    case Place::kEdges:
+      return smoothstep(0.15f, 0.7f,
+                        bends_away(scene, point, width, rays) +
+                            std::max(0.0f, relief(scene, texel.hit, point, 0.5f * width)));
+    case Place::kCrevices:
+      return smoothstep(0.15f, 0.7f,
+                        2.0f * closed_in(scene, point, width, rays) +
+                            std::max(0.0f, -relief(scene, texel.hit, point, 0.5f * width)));
+    case Place::kCavities:
+      return smoothstep(0.2f, 0.8f, closed_in(scene, point, kCavityDepth * radius, rays));
+    case Place::kUp:
+      return smoothstep(0.1f, 0.8f, point.n_shading.y);
+    case Place::kDown:
+      return smoothstep(0.1f, 0.8f, -point.n_shading.y);
+    case Place::kDrips:
+      break;
+  }
+  return drip_at(scene, point, radius);
+}
+
+}  // namespace
+
+asset::Map place_strength(const render::Scene& scene, const asset::Map& like, int width, int height,
+                          int material, std::span<const PlaceAmount> places, const Progress& progress) {
+  asset::Map map = asset::blank_map(like, width, height);
+  const std::vector<SurfaceTexel> surface = surface_of(scene, map, material);
+  vec3 low(std::numeric_limits<float>::infinity()), high(-low);
+  for (const asset::Primitive* primitive : views::asset_primitives(scene))
+    for (const vec3& p : primitive->p_world) low = glm::min(low, p), high = glm::max(high, p);
+  const float radius = 0.5f * glm::length(high - low);
+  Image covered(width, height, 1);
+  constexpr int64_t kTexelsAtOnce = 1 << 14;
+  const auto count = static_cast<int64_t>(surface.size());
+  for (int64_t first = 0; first < count; first += kTexelsAtOnce) {
+    progress.throw_if_stopped();
+    parallel_for(first, std::min(count, first + kTexelsAtOnce), 64, [&](int64_t begin, int64_t end) {
+      for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+        float& value = map.texels.pixels[surface[i].texel];
+        for (const PlaceAmount& p : places)
+          value = std::max(value, p.amount * value_at(scene, surface[i], p.place, radius));
+        covered.pixels[surface[i].texel] = 1.0f;
+      }
+    });
+    progress.update("masks", static_cast<double>(std::min(count, first + kTexelsAtOnce)),
+                    static_cast<double>(count));
+  }
+  map.texels = asset::dilated(map, covered, kPaddingTexels);
+  return map;
+}
+
+}  // namespace patina::masks
