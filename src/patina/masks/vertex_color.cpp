@@ -19,8 +19,12 @@ std::optional<asset::Map> vertex_color_strength(std::span<const asset::Primitive
     const auto& colors = touched.primitive->color;
     const vec4 color = colors.empty() ? vec4(1.0f) : touched.interpolated(colors);
     const float grey = std::clamp((color.r + color.g + color.b) / 3.0f, 0.0f, 1.0f);
-    map.texels.pixels[touched.texel] = std::max(map.texels.pixels[touched.texel], grey);
-    covered.pixels[touched.texel] = 1.0f;
+    // A place that has the texel's centre counts before places half a texel beside it.
+    const float certainty = touched.inside ? 1.0f : 0.5f;
+    float &value = map.texels.pixels[touched.texel], &known = covered.pixels[touched.texel];
+    if (certainty < known) return;
+    value = certainty > known ? grey : std::max(value, grey);
+    known = certainty;
   });
   map.texels = asset::dilated(map, covered, kPaddingTexels);
   return map;
