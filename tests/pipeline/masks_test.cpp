@@ -164,7 +164,7 @@ TEST(Masks, what_is_no_mask_is_refused_before_rendering) {
       {{"--where", "edges:1.5"}, 2, {"up to 1"}},
   };
   for (const Refusal& refusal : refusals) {
-    SCOPED_TRACE(refusal.options[1]);
+    SCOPED_TRACE(refusal.options.back());
     const fs::path output = folder.path() / "out.glb";
     const ProcessResult result = run_process(command(output, refusal.options), {.seconds = 120});
     EXPECT_EQ(result.exit_code, refusal.exit_code) << result.error;
