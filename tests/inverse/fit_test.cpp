@@ -554,6 +554,19 @@ std::vector<asset::Map> half_masked() {
   return strength;
 }
 
+// A map at the size of the fit's result: as it came, or resampled, which makes normals shorter than one.
+Image at_size_of(const Image& result, const asset::Map& map, asset::MapEncoding encoding) {
+  Image texels = asset::resized(map, result.width, result.height).texels;
+  const bool same_size = map.texels.width == result.width && map.texels.height == result.height;
+  if (same_size || encoding != asset::MapEncoding::kNormal) return texels;
+  for (size_t i = 0; i < texels.pixels.size(); i += 3) {
+    float* n = &texels.pixels[i];
+    const vec3 unit = glm::normalize(vec3(n[0], n[1], n[2]));
+    n[0] = unit.x, n[1] = unit.y, n[2] = unit.z;
+  }
+  return texels;
+}
+
 TEST(fit, texels_without_strength_keep_their_values_in_every_map) {
   Task task = make_task(64);
   const std::vector<asset::Map> strength = half_masked();
@@ -566,8 +579,7 @@ TEST(fit, texels_without_strength_keep_their_values_in_every_map) {
     for (const asset::MapSlotRow& row : asset::kMapSlots) {
       if (!has(options.maps, row.slot)) continue;
       const asset::Map& now = slot_map(result.maps[0], row.slot);
-      const Image old =
-          asset::resized(slot_map(before[0], row.slot), now.texels.width, now.texels.height).texels;
+      const Image old = at_size_of(now.texels, slot_map(before[0], row.slot), row.encoding);
       const auto channels = static_cast<size_t>(old.channels);
       size_t changed = 0;
       for (size_t i = 0; i < old.num_pixels(); ++i) {
