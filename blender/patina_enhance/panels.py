@@ -135,6 +135,7 @@ class PATINA_PT_more(_Sidebar, bpy.types.Panel):
         for name in ("views", "model", "config", "images"):
             layout.prop(settings, name)
         layout.column().prop(settings, "maps")
+        layout.column().prop(settings, "where")
 
 
 class PATINA_PT_material(bpy.types.Panel):

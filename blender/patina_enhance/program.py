@@ -26,6 +26,7 @@ class Options:
     environment: str = ""  # a file; empty is the built-in studio
     maps: list = field(default_factory=list)  # base_color, roughness, metallic, normal
     materials: list = field(default_factory=list)
+    where: list = field(default_factory=list)  # edges, crevices, ...; empty: everywhere
 
 
 DRAFT_VIEWS, DRAFT_STEPS = 4, 12  # the preset fast, which `patina detail` does not have
@@ -71,6 +72,7 @@ def _edit(options):
         + _one("negative-prompt", options.negative_prompt)
         + _one("strength", f"{options.strength:.4g}")
         + _one("seed", options.seed)
+        + _each("where", options.where)
     )
 
 

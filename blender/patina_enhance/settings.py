@@ -98,6 +98,20 @@ class PATINA_Scene(bpy.types.PropertyGroup):
         items=[(name, name.replace("_", " ").capitalize(), "") for name in MAPS],
         default={"base_color", "roughness", "normal"},
     )
+    where: EnumProperty(
+        name="Where",
+        description="Only there: masks that patina makes from the shape. None: everywhere",
+        options={"ENUM_FLAG"},
+        items=[
+            ("edges", "Edges", "The surface bends away"),
+            ("crevices", "Crevices", "It is closed in nearby"),
+            ("cavities", "Cavities", "Other surface hides the sky"),
+            ("up", "Up", "It faces up"),
+            ("down", "Down", "It faces down"),
+            ("drips", "Drips", "Streaks run down from upper rims"),
+        ],
+        default=set(),
+    )
     config: StringProperty(
         name="Options File",
         subtype="FILE_PATH",
@@ -139,6 +153,7 @@ def options_of(context, materials, environment):
         environment=environment,
         maps=[name for name in MAPS if name in settings.maps],
         materials=materials,
+        where=sorted(settings.where),
     )
 
 

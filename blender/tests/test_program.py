@@ -126,8 +126,17 @@ class Program(unittest.TestCase):
             "--negative-prompt",
             "--config",
             "--fit",
+            "--where",
         ):
             self.assertNotIn(option + "=", text)
+
+    def test_places_go_to_draft_and_enhance(self):
+        options = program.Options(prompt="x", where=["drips", "edges"])
+        enhance = program.enhance_command("patina", options, "a", "b", "run")
+        _, detail = program.draft_commands("patina", options, "a", "run")
+        for command in (enhance, detail):
+            self.assertIn("--where=drips", command)
+            self.assertIn("--where=edges", command)
 
     def test_a_wrong_path_is_named(self):
         with self.assertRaisesRegex(program.ProgramMissing, "/no/such/patina"):
