@@ -1,6 +1,7 @@
 #include "patina/masks/places.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -99,29 +100,67 @@ float drip_at(const render::Scene& scene, render::SurfacePoint point, float radi
   return smoothstep(0.45f, 0.75f, cell_noise(source)) * (1.0f - walked / length);
 }
 
-float value_at(const render::Scene& scene, const SurfaceTexel& texel, Place place, float radius) {
+// Rays are few, so what they say is noisy from texel to texel, and smoothed before it is judged.
+bool is_noisy(Place place) {
+  return place == Place::kEdges || place == Place::kCrevices || place == Place::kCavities;
+}
+
+float strength_of(Place place, float measured) {
+  switch (place) {
+    case Place::kEdges:
+    case Place::kCrevices:
+      return smoothstep(0.15f, 0.7f, measured);
+    case Place::kCavities:
+      return smoothstep(0.2f, 0.8f, measured);
+    case Place::kUp:
+    case Place::kDown:
+      return smoothstep(0.1f, 0.8f, measured);
+    case Place::kDrips:
+      break;
+  }
+  return measured;
+}
+
+float measured_at(const render::Scene& scene, const SurfaceTexel& texel, Place place, float radius) {
   const render::SurfacePoint point = front_of(scene, texel.hit);
   const ShapeRays rays{.count = 32, .seed = kSeed, .index = texel.texel};
   const float width = kEdgeWidth * radius;
   switch (place) {
     case Place::kEdges:
-      return smoothstep(0.15f, 0.7f,
-                        bends_away(scene, point, width, rays) +
-                            std::max(0.0f, relief(scene, texel.hit, point, 0.5f * width)));
+      return bends_away(scene, point, width, rays) +
+             std::max(0.0f, relief(scene, texel.hit, point, 0.5f * width));
     case Place::kCrevices:
-      return smoothstep(0.15f, 0.7f,
-                        2.0f * closed_in(scene, point, width, rays) +
-                            std::max(0.0f, -relief(scene, texel.hit, point, 0.5f * width)));
+      return 2.0f * closed_in(scene, point, width, rays) +
+             std::max(0.0f, -relief(scene, texel.hit, point, 0.5f * width));
     case Place::kCavities:
-      return smoothstep(0.2f, 0.8f, closed_in(scene, point, kCavityDepth * radius, rays));
+      return closed_in(scene, point, kCavityDepth * radius, rays);
     case Place::kUp:
-      return smoothstep(0.1f, 0.8f, point.n_shading.y);
+      return point.n_shading.y;
     case Place::kDown:
-      return smoothstep(0.1f, 0.8f, -point.n_shading.y);
+      return -point.n_shading.y;
     case Place::kDrips:
       break;
   }
   return drip_at(scene, point, radius);
+}
+
+// Binomial mean over five texels along x or y, of those that lie on the surface.
+Image smoothed(const Image& values, const Image& covered, ivec2 axis) {
+  constexpr std::array<float, 5> kWeights{1, 4, 6, 4, 1};
+  Image out = values;
+  for (int y = 0; y < values.height; ++y)
+    for (int x = 0; x < values.width; ++x) {
+      if (*covered.at(x, y) <= 0.0f) continue;
+      float sum = 0, weight = 0;
+      for (int k = -2; k <= 2; ++k) {
+        const int u = x + k * axis.x, v = y + k * axis.y;
+        if (u < 0 || v < 0 || u >= values.width || v >= values.height) continue;
+        const float w = kWeights[static_cast<size_t>(k + 2)] * *covered.at(u, v);
+        sum += w * *values.at(u, v), weight += w;
+      }
+      *out.at(x, y) = sum / weight;
+    }
+  return out;
 }
 
 }  // namespace
@@ -135,20 +174,26 @@ asset::Map place_strength(const render::Scene& scene, const asset::Map& like, in
     for (const vec3& p : primitive->p_world) low = glm::min(low, p), high = glm::max(high, p);
   const float radius = 0.5f * glm::length(high - low);
   Image covered(width, height, 1);
+  for (const SurfaceTexel& texel : surface) covered.pixels[texel.texel] = 1.0f;
   constexpr int64_t kTexelsAtOnce = 1 << 14;
   const auto count = static_cast<int64_t>(surface.size());
-  for (int64_t first = 0; first < count; first += kTexelsAtOnce) {
-    progress.throw_if_stopped();
-    parallel_for(first, std::min(count, first + kTexelsAtOnce), 64, [&](int64_t begin, int64_t end) {
-      for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-        float& value = map.texels.pixels[surface[i].texel];
-        for (const PlaceAmount& p : places)
-          value = std::max(value, p.amount * value_at(scene, surface[i], p.place, radius));
-        covered.pixels[surface[i].texel] = 1.0f;
-      }
-    });
-    progress.update("masks", static_cast<double>(std::min(count, first + kTexelsAtOnce)),
-                    static_cast<double>(count));
+  const double total = static_cast<double>(count) * static_cast<double>(places.size());
+  for (size_t p = 0; p < places.size(); ++p) {
+    Image measured(width, height, 1);
+    for (int64_t first = 0; first < count; first += kTexelsAtOnce) {
+      progress.throw_if_stopped();
+      const int64_t last = std::min(count, first + kTexelsAtOnce);
+      parallel_for(first, last, 64, [&](int64_t begin, int64_t end) {
+        for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i)
+          measured.pixels[surface[i].texel] = measured_at(scene, surface[i], places[p].place, radius);
+      });
+      progress.update("masks", static_cast<double>(static_cast<int64_t>(p) * count + last), total);
+    }
+    if (is_noisy(places[p].place)) measured = smoothed(smoothed(measured, covered, {1, 0}), covered, {0, 1});
+    for (const SurfaceTexel& texel : surface) {
+      float& value = map.texels.pixels[texel.texel];
+      value = std::max(value, places[p].amount * strength_of(places[p].place, measured.pixels[texel.texel]));
+    }
   }
   map.texels = asset::dilated(map, covered, kPaddingTexels);
   return map;
