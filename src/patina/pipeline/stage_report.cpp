@@ -149,6 +149,15 @@ std::vector<report::RelitPictures> relit_pictures(const Workbench& bench, std::s
   return all;
 }
 
+// The masks of the materials that have one.
+std::vector<report::MaskPicture> mask_pictures(const Workbench& bench) {
+  std::vector<report::MaskPicture> pictures;
+  for (size_t m = 0; m < bench.strength.maps.size(); ++m)
+    if (const Image& texels = bench.strength.maps[m].texels; texels.num_pixels() > 1)
+      pictures.push_back({bench.maps[m].name, texels});
+  return pictures;
+}
+
 // What the page says the run was asked for: config.json, as `patina` writes it.
 json asked_for(const RunFolder& run) {
   const json config = read_json(run.file("config.json"));
@@ -182,6 +191,8 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
       page.loss.push_back(loss.is_number() ? loss.get<float>() : NAN);
   const std::vector<OtherLight> lights = other_lights(bench);
   page.relit = relit_pictures(bench, lights, run);
+  page.masks = mask_pictures(bench);
+  page.strength = bench.strength.views;
   page.viewer = viewer(bench, fitted, lights, record.metrics.at("relight"), views.set.exposure_ev);
   page.config = asked_for(run);
   page.metrics = gather_metrics(run, record.metrics);

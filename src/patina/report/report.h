@@ -13,6 +13,7 @@
 #include "patina/render/path_tracer.h"
 #include "patina/render/scene.h"
 #include "patina/report/other_light.h"
+#include "patina/report/where.h"
 
 namespace patina::report {
 
@@ -40,6 +41,8 @@ struct ReportData {
   std::vector<Image> before, edited, after;  // one a view, sRGB
   std::vector<TexturePair> textures;
   std::vector<RelitPictures> relit;
+  std::vector<MaskPicture> masks;
+  std::vector<Image> strength;  // of the masks, one a view (where.h); empty: none
   std::vector<float> loss;
   nlohmann::json config, metrics;
   std::vector<std::string> warnings;
