@@ -35,6 +35,7 @@ inline const std::vector<OptionCase> kOptionCases{
     {"where", {"up:0.5"}, kFromEdit},
 
     {"output", {"FILE:out.glb"}, ""},
+    {"blend", {"0.5"}, "report"},
     {"run", {"FILE:elsewhere"}, ""},
     {"keep", {"true"}, ""},
     {"material", {"enamel"}, kFromFit},

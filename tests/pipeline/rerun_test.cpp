@@ -1,4 +1,5 @@
 // Which stages run again when one option changes: those that read it, and those that read what they make.
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <set>
@@ -7,7 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "option_table.h"
+#include "patina/asset/asset.h"
 #include "patina/asset/export.h"
+#include "patina/asset/material_maps.h"
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/enhance.h"
@@ -158,6 +161,30 @@ TEST_F(Rerun, every_option_runs_the_stages_that_depend_on_it) {
     tried.insert(c.name);
   }
   for (const Option& option : options()) EXPECT_TRUE(tried.count(option.name)) << option.name;
+}
+
+// The asset's pictures with another share of the new textures, from the finished run.
+TEST_F(Rerun, the_output_is_blended_without_another_fit) {
+  const auto colors = [&](float share) {
+    Config config = base();
+    config.blend = share;
+    config.output = file("blended.glb");
+    EXPECT_EQ(stages_of(config), share == 1 ? "" : "report");
+    const asset::Asset made = asset::read_asset(config.output);
+    return asset::resolve_materials(made)[0].base_color.texels;
+  };
+  const asset::Map before = asset::resolve_materials(asset::read_asset(kettle()))[0].base_color;
+  const Image all = colors(1), half = colors(0.5f), none = colors(0);
+  EXPECT_EQ(none.pixels, before.texels.pixels);
+  const Image old = asset::resized(before, all.width, all.height).texels;
+  ASSERT_EQ(half.width, all.width);
+  double moved = 0;
+  for (size_t i = 0; i < half.pixels.size(); ++i) {
+    EXPECT_NEAR(half.pixels[i], 0.5f * (old.pixels[i] + all.pixels[i]), 0.02f);
+    moved += std::abs(all.pixels[i] - old.pixels[i]);
+  }
+  EXPECT_GT(moved, 0);
+  EXPECT_TRUE(fs::exists(file("run") / "textures" / "before" / "00_enamel_base_color.png"));
 }
 
 // Faults of keys that did not hold all that a stage read.

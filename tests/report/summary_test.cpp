@@ -59,6 +59,15 @@ TEST(Summary, advises_what_the_measures_ask_for) {
   EXPECT_FALSE(says(summary(metrics, {}), "environment")) << "a new colour changes alike in every light";
 }
 
+TEST(Summary, of_a_blended_result_does_not_blame_the_fit) {
+  json metrics = usual_metrics();
+  metrics["fit"] = {{"psnr", 15.0}};
+  EXPECT_TRUE(says(summary(metrics, {{"blend", 1.0}}), "more iterations"));
+  const std::string html = summary(metrics, {{"blend", 0.25}});
+  EXPECT_FALSE(says(html, "more iterations"));
+  EXPECT_TRUE(says(html, "25 % new"));
+}
+
 TEST(Summary, says_nothing_of_what_is_not_known_and_escapes_names) {
   EXPECT_EQ(summary(json(), json()), "");
   EXPECT_EQ(summary(json::object(), json()), "");

@@ -30,6 +30,7 @@ struct InputSettings {
 struct Config {
   Preset preset = Preset::kUsual;
   std::filesystem::path output;  // empty: no export
+  float blend = 1.0f;            // share of the new textures in the output (blend.h)
   std::filesystem::path run;     // empty: beside the output, <output stem>.patina-run
   bool keep = false;             // what was changed by hand in the run folder stays when its stage runs again
 

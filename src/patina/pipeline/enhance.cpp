@@ -9,6 +9,7 @@
 #include "patina/base/files.h"
 #include "patina/base/text.h"
 #include "patina/diffusion/model.h"
+#include "patina/pipeline/blend.h"
 #include "patina/pipeline/options.h"
 
 namespace patina::pipeline {
@@ -37,8 +38,9 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
   const std::vector<Image> edited = edit_stage(bench, views, config.edit, model, run, progress);  // → detail/
   model.unload();
-  const FittedMaterials fitted = fit_stage(bench, views, edited, config.fit, run, progress);  // → textures/
-  write_output(bench, fitted, config.output);                                                 // → the asset
+  FittedMaterials fitted = fit_stage(bench, views, edited, config.fit, run, progress);  // → textures/
+  fitted = blended(bench, std::move(fitted), config.blend);
+  write_output(bench, fitted, config.output);                                // → the asset
   report_stage(bench, views, edited, fitted, config.report, run, progress);  // → report.html
 }
 
@@ -69,7 +71,8 @@ void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
   mask_stage(bench, config.masks, run, progress);
   const RenderedViews views = load_views(bench, run);
   const std::vector<Image> edited = load_edited(views, run);
-  write_output(bench, fit_stage(bench, views, edited, config.fit, run, progress), config.output);
+  FittedMaterials fitted = fit_stage(bench, views, edited, config.fit, run, progress);
+  write_output(bench, blended(bench, std::move(fitted), config.blend), config.output);
 }
 
 void run_report(Config config, RunFolder& run, const RunProgress& progress) {
@@ -78,7 +81,8 @@ void run_report(Config config, RunFolder& run, const RunProgress& progress) {
   Workbench bench = open_workbench(config.inputs, progress);
   mask_stage(bench, config.masks, run, progress);
   const RenderedViews views = load_views(bench, run);
-  report_stage(bench, views, load_edited(views, run), load_fitted(bench, run), config.report, run, progress);
+  const FittedMaterials fitted = blended(bench, load_fitted(bench, run), config.blend);
+  report_stage(bench, views, load_edited(views, run), fitted, config.report, run, progress);
 }
 
 void check_inputs(const Config& config) {

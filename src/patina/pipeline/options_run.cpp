@@ -12,14 +12,20 @@ namespace {
 
 const std::string kFiles = "Input and output", kMachineGroup = "Machine";
 
-// A path of Config itself.
-Option path_of_run(const About& about, unsigned parts, std::filesystem::path Config::*field) {
-  Option made = described(about, kFiles, parts, path());
-  made.set = [named = made, field](Config& c, const json& value) {
-    if (!value.is_string()) refuse(named, value);
-    c.*field = value.get<std::string>();
+// An option that fills a field of Config itself.
+template <class T>
+Option option_of_run(const About& about, const std::string& group, unsigned parts, const Kind<T>& kind,
+                     T Config::*field) {
+  Option made = described(about, group, parts, kind);
+  made.set = [named = made, kind, field](Config& c, const json& value) {
+    const std::optional<T> decoded = kind.decode(value);
+    if (!decoded) refuse(named, value);
+    c.*field = *decoded;
   };
-  made.get = [field](const Config& c) { return json((c.*field).string()); };
+  made.get = [kind, field](const Config& c) { return kind.encode(c.*field); };
+  const json usual = made.get(Config{});
+  if (made.default_text.empty())
+    made.default_text = usual.is_string() ? usual.get<std::string>() : usual.dump();
   return made;
 }
 
@@ -42,53 +48,31 @@ Option seed() {
                  option(Place<ReportSettings>{kMachineGroup, &Config::report, kReport}, about, kind, field)});
 }
 
-Option keep() {
-  Option made = described(
-      About{.name = "keep",
-            .help = "Keep pictures of the run folder that were changed by hand when their stage runs again. "
-                    "Without it they are replaced, and a copy stays beside them.",
-            .default_text = "false"},
-      kFiles, kRender | kEdit | kFit, truth());
-  made.set = [named = made](Config& c, const json& value) {
-    if (!value.is_boolean()) refuse(named, value);
-    c.keep = value.get<bool>();
-  };
-  made.get = [](const Config& c) { return json(c.keep); };
-  return made;
-}
-
-Option threads() {
-  const Kind<int> kind = integer(0, 1024);
-  Option made = described(
-      About{
-          .name = "threads", .aliases = {"-j"}, .placeholder = "N", .help = "Processors to use. 0 uses all."},
-      kMachineGroup, kMachine, kind);
-  made.set = [named = made, kind](Config& c, const json& value) {
-    const std::optional<int> decoded = kind.decode(value);
-    if (!decoded) refuse(named, value);
-    c.num_threads = *decoded;
-  };
-  made.get = [](const Config& c) { return json(c.num_threads); };
-  made.default_text = "0";
-  return made;
-}
-
 }  // namespace
 
 std::vector<Option> input_output_options() {
   return {
-      path_of_run({.name = "output",
-                   .aliases = {"-o"},
-                   .placeholder = "OUT.glb",
-                   .help = "Where the enhanced asset goes: .glb, .gltf or .obj."},
-                  kOutput, &Config::output),
-      path_of_run({.name = "run",
-                   .placeholder = "DIR",
-                   .help = "Folder for everything in between. The same command continues a killed run "
-                           "there.",
-                   .default_text = "beside the output, OUT.patina-run"},
-                  kInputs, &Config::run),
-      keep(),
+      option_of_run({.name = "output",
+                     .aliases = {"-o"},
+                     .placeholder = "OUT.glb",
+                     .help = "Where the enhanced asset goes: .glb, .gltf or .obj."},
+                    kFiles, kOutput, path(), &Config::output),
+      option_of_run({.name = "blend",
+                     .placeholder = "X",
+                     .help = "Share of the new textures in the output: 1 takes them as they are, 0 the old "
+                             "ones. Another share fits nothing again."},
+                    kFiles, kOutput, number(0, 1), &Config::blend),
+      option_of_run({.name = "run",
+                     .placeholder = "DIR",
+                     .help = "Folder for everything in between. The same command continues a killed run "
+                             "there.",
+                     .default_text = "beside the output, OUT.patina-run"},
+                    kFiles, kInputs, path(), &Config::run),
+      option_of_run(
+          {.name = "keep",
+           .help = "Keep pictures of the run folder that were changed by hand when their stage runs again. "
+                   "Without it they are replaced, and a copy stays beside them."},
+          kFiles, kRender | kEdit | kFit, truth(), &Config::keep),
       list_option(
           Place<InputSettings>{kFiles, &Config::inputs, kInputs | kFit},
           {.name = "material",
@@ -107,7 +91,11 @@ std::vector<Option> input_output_options() {
 }
 
 std::vector<Option> machine_options() {
-  return {seed(), threads()};
+  return {seed(), option_of_run({.name = "threads",
+                                 .aliases = {"-j"},
+                                 .placeholder = "N",
+                                 .help = "Processors to use. 0 uses all."},
+                                kMachineGroup, kMachine, integer(0, 1024), &Config::num_threads)};
 }
 
 }  // namespace patina::pipeline

@@ -25,22 +25,21 @@ constexpr float kTooCoarse = 0.5f;
 
 // Where the stage's outputs go, and what a fit shows before it is done: never over the outputs of a run with
 // other options, to which the user may come back.
-constexpr const char *kFolder = "textures", *kPreviewFolder = "preview";
+constexpr const char *kFolder = "textures", *kBeforeFolder = "textures/before", *kPreviewFolder = "preview";
 
-// Writes every map that was fitted to `folder`; says which files and of what (the metric "maps").
+// Writes every changed map to `folder`; says which files and of what (the metric "maps").
 struct WrittenMaps {
   std::vector<std::string> files;
   json entries = json::array();
 };
-WrittenMaps write_maps(const inverse::FitResult& fitted, const Workbench& bench, const RunFolder& run,
-                       const char* folder) {
+WrittenMaps write_maps(std::span<const asset::MaterialMaps> maps, std::span<const asset::MapSet> changed,
+                       const RunFolder& run, const char* folder) {
   WrittenMaps written;
-  for (size_t m = 0; m < fitted.maps.size(); ++m)
+  for (size_t m = 0; m < maps.size(); ++m)
     for (const asset::MapSlotRow& slot : asset::kMapSlots) {
-      if (!has(fitted.changed[m], slot.slot)) continue;
-      const std::string file = material_file(folder, m, bench.maps[m].name, slot.name);
-      write_image(run.file(file),
-                  asset::picture_of(slot_map(fitted.maps[m], slot.slot).texels, slot.encoding));
+      if (!has(changed[m], slot.slot)) continue;
+      const std::string file = material_file(folder, m, maps[m].name, slot.name);
+      write_image(run.file(file), asset::picture_of(slot_map(maps[m], slot.slot).texels, slot.encoding));
       written.files.push_back(file);
       written.entries.push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
     }
@@ -106,15 +105,17 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
       progress.tell_preview(page);
     };
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
-      (void)write_maps(so_far, bench, run, kPreviewFolder);
+      (void)write_maps(so_far.maps, so_far.changed, run, kPreviewFolder);
     };
     const inverse::FitResult fitted =
         inverse::fit_materials(*bench.scene, {views.set, edited, bench.enhanced, bench.strength.maps},
                                settings.options, hooks, progress);
 
     RunFolder::StageResult result;
-    WrittenMaps written = write_maps(fitted, bench, run, kFolder);
+    WrittenMaps written = write_maps(fitted.maps, fitted.changed, run, kFolder);
     result.outputs = std::move(written.files);
+    const WrittenMaps before = write_maps(bench.maps, fitted.changed, run, kBeforeFolder);
+    result.outputs.insert(result.outputs.end(), before.files.begin(), before.files.end());
     result.metrics["maps"] = std::move(written.entries);
     result.metrics["density"] = json::array();
     for (const inverse::MapDensity& density : fitted.density) {

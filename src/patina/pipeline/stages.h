@@ -50,7 +50,8 @@ std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views
                               const EditSettings& settings, ResolvedModel& model, RunFolder& run,
                               const RunProgress& progress);
 
-/// Carries the edit into the textures → textures/NN_<material>_<slot>.png; meanwhile preview/preview.html.
+/// Carries the edit into the textures → textures/NN_<material>_<slot>.png, with those before in
+/// textures/before/; meanwhile preview/preview.html.
 /// A fit that is stopped leaves its textures so far in preview/ and goes on from its checkpoint the next
 /// time.
 struct FittedMaterials {

@@ -100,8 +100,18 @@ std::string changed_material(const json& material) {
   return text;
 }
 
-std::vector<std::string> what_changed(const json& metrics) {
+// Whether the result holds less than all of what the fit made.
+bool is_blended(const json& config) {
+  return number_at(config, "/blend") < 1;
+}
+
+std::vector<std::string> what_changed(const json& metrics, const json& config) {
   std::vector<std::string> items;
+  if (is_blended(config))
+    items.push_back(fmt::format(
+        "The textures are {:.0f} % new, the rest is as it was (<code>blend</code>). The numbers below are "
+        "those of the mixture.",
+        100 * number_at(config, "/blend")));
   for (const json& material : list_at(metrics, "/materials")) items.push_back(changed_material(material));
   return items;
 }
@@ -148,7 +158,7 @@ std::string uneven_change(const json& material) {
       escaped(text_at(material, "/material"), 200), low, high);
 }
 
-std::vector<std::string> what_to_try(const json& metrics) {
+std::vector<std::string> what_to_try(const json& metrics, const json& config) {
   std::vector<std::string> items;
   const auto advise = [&](bool applies, const char* text) {
     if (applies) items.push_back(text);
@@ -162,7 +172,7 @@ std::vector<std::string> what_to_try(const json& metrics) {
          "seed.");
   advise(number_at(metrics, "/fit/psnr_before") > 30,
          "The edit is weak: try a larger strength, or a prompt that names what the surface looks like.");
-  advise(number_at(metrics, "/fit/psnr") < 22,
+  advise(!is_blended(config) && number_at(metrics, "/fit/psnr") < 22,
          "The textures are far from the edited views: let the fit run for more iterations.");
   const json& densities = list_at(metrics, "/fit/density");
   advise(std::any_of(densities.begin(), densities.end(),
@@ -190,9 +200,9 @@ std::string section(const char* title, const std::vector<std::string>& items) {
 
 std::string summary(const json& metrics, const json& config) {
   if (!metrics.is_object()) return "";
-  const std::string html = section("What changed", what_changed(metrics)) +
+  const std::string html = section("What changed", what_changed(metrics, config)) +
                            section("Where nothing was seen", what_was_not_seen(metrics, config)) +
-                           section("What to try", what_to_try(metrics));
+                           section("What to try", what_to_try(metrics, config));
   return html.empty() ? "" : "<section class=\"summary\">\n" + html + "</section>\n";
 }
 
