@@ -80,6 +80,12 @@ TEST(Places, amounts_scale_and_the_strongest_of_several_counts) {
   }
 }
 
+// Few rays a texel are noisy; a mask must not be.
+TEST(Places, edges_are_smooth_along_the_border) {
+  const Image edges = Box().map(1, {{Place::kEdges, 1}});
+  for (int i = 8; i < kSide - 9; ++i) EXPECT_NEAR(*edges.at(i, 1), *edges.at(i + 1, 1), 0.2f) << i;
+}
+
 // Streaks begin at the upper rim of the front and fade on their way down; there are some, and gaps between.
 TEST(Places, drips_run_down_from_the_upper_rim) {
   const Box box;

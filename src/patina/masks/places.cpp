@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "patina/asset/texel_raster.h"
@@ -73,26 +74,36 @@ float cell_noise(const vec2& at) {
   return glm::mix(glm::mix(value(0, 0), value(1, 0), s.x), glm::mix(value(0, 1), value(1, 1), s.x), s.y);
 }
 
-// Walks up the surface until it ends, turns flat or is closed off. Whether and how strongly a streak runs
-// down from there is up to the place where the walk ends, so that all points below it agree.
+constexpr float kFlat = 0.8f;  // height of a normal of surface on which water rests
+
+// The point of the surface `step` metres up its slope; nothing where it ends, turns flat or is closed off.
+std::optional<render::SurfacePoint> step_up(const render::Scene& scene, const render::SurfacePoint& point,
+                                            float step) {
+  const vec3 n = point.n_geometric;
+  render::Ray ray;
+  ray.origin = point.p_world + step * (glm::normalize(vec3(0, 1, 0) - n.y * n) + n);
+  ray.direction = -n;
+  ray.t_max = 2.0f * step;
+  const auto hit = scene.intersect(ray);
+  if (!hit || static_cast<int>(hit->primitive) >= scene.num_asset_primitives()) return std::nullopt;
+  const render::SurfacePoint next = scene.surface(ray, *hit);
+  if (next.n_geometric.y > kFlat || glm::dot(next.n_geometric, n) < 0.2f) return std::nullopt;
+  return next;
+}
+
+// Walks up the surface as far as it goes. Whether and how strongly a streak runs down from there is up to the
+// place where the walk ends, so that all points below it agree: steps get shorter there, to find that place.
 float drip_at(const render::Scene& scene, render::SurfacePoint point, float radius) {
-  constexpr float kFlat = 0.8f;  // of the normal's height: water rests there
-  const float step = kStreakStep * radius;
   if (std::abs(point.n_geometric.y) > kFlat) return 0.0f;
-  float walked = 0;
-  while (walked < kStreakLength * radius) {
-    const vec3 n = point.n_geometric;
-    const vec3 up = glm::normalize(vec3(0, 1, 0) - n.y * n);
-    render::Ray ray;
-    ray.origin = point.p_world + step * (up + n);
-    ray.direction = -n;
-    ray.t_max = 2.0f * step;
-    const auto hit = scene.intersect(ray);
-    if (!hit || static_cast<int>(hit->primitive) >= scene.num_asset_primitives()) break;
-    const render::SurfacePoint next = scene.surface(ray, *hit);
-    if (next.n_geometric.y > kFlat || glm::dot(next.n_geometric, n) < 0.2f) break;
-    point = next;
-    walked += step;
+  float walked = 0, step = kStreakStep * radius;
+  const float shortest = step / 32.0f;
+  while (walked < kStreakLength * radius && step > shortest) {
+    if (const auto next = step_up(scene, point, step)) {
+      point = *next;
+      walked += step;
+    } else {
+      step /= 2.0f;
+    }
   }
   const vec2 source = vec2(point.p_world.x, point.p_world.z) / (kStreakWidth * radius);
   const float length = kStreakLength * radius * cell_noise(source + vec2(1000.0f));
@@ -109,7 +120,7 @@ float strength_of(Place place, float measured) {
   switch (place) {
     case Place::kEdges:
     case Place::kCrevices:
-      return smoothstep(0.15f, 0.7f, measured);
+      return smoothstep(0.15f, 0.6f, measured);
     case Place::kCavities:
       return smoothstep(0.2f, 0.8f, measured);
     case Place::kUp:
@@ -123,7 +134,7 @@ float strength_of(Place place, float measured) {
 
 float measured_at(const render::Scene& scene, const SurfaceTexel& texel, Place place, float radius) {
   const render::SurfacePoint point = front_of(scene, texel.hit);
-  const ShapeRays rays{.count = 32, .seed = kSeed, .index = texel.texel};
+  const ShapeRays rays{.count = 64, .seed = kSeed, .index = texel.texel};
   const float width = kEdgeWidth * radius;
   switch (place) {
     case Place::kEdges:
@@ -144,18 +155,18 @@ float measured_at(const render::Scene& scene, const SurfaceTexel& texel, Place p
   return drip_at(scene, point, radius);
 }
 
-// Binomial mean over five texels along x or y, of those that lie on the surface.
+// Binomial mean over three texels along x or y, of those that lie on the surface.
 Image smoothed(const Image& values, const Image& covered, ivec2 axis) {
-  constexpr std::array<float, 5> kWeights{1, 4, 6, 4, 1};
+  constexpr std::array<float, 3> kWeights{1, 2, 1};
   Image out = values;
   for (int y = 0; y < values.height; ++y)
     for (int x = 0; x < values.width; ++x) {
       if (*covered.at(x, y) <= 0.0f) continue;
       float sum = 0, weight = 0;
-      for (int k = -2; k <= 2; ++k) {
+      for (int k = -1; k <= 1; ++k) {
         const int u = x + k * axis.x, v = y + k * axis.y;
         if (u < 0 || v < 0 || u >= values.width || v >= values.height) continue;
-        const float w = kWeights[static_cast<size_t>(k + 2)] * *covered.at(u, v);
+        const float w = kWeights[static_cast<size_t>(k + 1)] * *covered.at(u, v);
         sum += w * *values.at(u, v), weight += w;
       }
       *out.at(x, y) = sum / weight;
