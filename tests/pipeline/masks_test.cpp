@@ -159,6 +159,7 @@ TEST(Masks, what_is_no_mask_is_refused_before_rendering) {
       {{"--mask", file("transparent.png")}, 1, {"transparent.png", "(0, 1)", "transparent"}},
       {{"--mask", file("text.png")}, 1, {"text.png"}},
       {{"--mask", file("missing.png")}, 1, {"missing.png"}},
+      {{"--mask", "enamel="}, 2, {"mask", "MATERIAL=FILE", "'enamel='"}},
       {{"--mask-vertex-color"}, 2, {"COLOR_0"}},
       {{"--where", "corners"}, 2, {"edges", "crevices", "drips", "'corners'"}},
       {{"--where", "edges:1.5"}, 2, {"up to 1"}},

@@ -41,6 +41,9 @@ MaskFile parsed(const std::string& text, const Workbench& bench) {
     const bool known = std::any_of(bench.asset.materials.begin(), bench.asset.materials.end(),
                                    [&](const asset::Material& m) { return m.name == name; });
     if (!known && !last) continue;
+    if (at + 1 == text.size())
+      throw Error(ErrorCode::kUsage, "mask",
+                  fmt::format("expected FILE or MATERIAL=FILE, found '{}'", printable(text)));
     MaskFile mask{text.substr(at + 1),
                   named_materials(bench.asset, {known ? name : text.substr(0, text.find('='))}, "mask")};
     for (size_t m = 0; m < mask.materials.size(); ++m)
