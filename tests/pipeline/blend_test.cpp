@@ -42,7 +42,8 @@ TEST(Blend, mixes_linear_values_by_the_share_of_the_new) {
   EXPECT_NEAR(color.b, 0.15f, 1e-6f);
   ASSERT_EQ(mixed.roughness.texels.width, 4) << "the size of the new one";
   for (const float value : mixed.roughness.texels.pixels) EXPECT_NEAR(value, 0.6f, 1e-6f);
-  const vec3 normal = mixed.normal.texels.rgb(0, 0), between(0.577f, 0.577f, 0.577f + 0.25f * 0.423f);
+  const vec3 normal = mixed.normal.texels.rgb(0, 0),
+             between(0.75f * 0.577f, 0.75f * 0.577f, 0.577f + 0.25f * 0.423f);
   EXPECT_LT(glm::length(normal - glm::normalize(between)), 1e-6f);
 }
 
