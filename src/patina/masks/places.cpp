@@ -163,10 +163,10 @@ Image smoothed(const Image& values, const Image& covered, ivec2 axis) {
     for (int x = 0; x < values.width; ++x) {
       if (*covered.at(x, y) <= 0.0f) continue;
       float sum = 0, weight = 0;
-      for (int k = -1; k <= 1; ++k) {
-        const int u = x + k * axis.x, v = y + k * axis.y;
+      for (int k = 0; k < 3; ++k) {
+        const int u = x + (k - 1) * axis.x, v = y + (k - 1) * axis.y;
         if (u < 0 || v < 0 || u >= values.width || v >= values.height) continue;
-        const float w = kWeights[static_cast<size_t>(k + 1)] * *covered.at(u, v);
+        const float w = kWeights[static_cast<size_t>(k)] * *covered.at(u, v);
         sum += w * *values.at(u, v), weight += w;
       }
       *out.at(x, y) = sum / weight;

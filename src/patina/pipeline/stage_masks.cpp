@@ -58,6 +58,7 @@ MaskFile parsed(const std::string& text, const Workbench& bench) {
 
 std::vector<MaskFile> parsed(const std::vector<std::string>& texts, const Workbench& bench) {
   std::vector<MaskFile> files;
+  files.reserve(texts.size());
   for (const std::string& text : texts) files.push_back(parsed(text, bench));
   return files;
 }
