@@ -149,7 +149,7 @@ std::string textures(const ReportData& data) {
     const std::string before_size = size_text(pair.before), after_size = size_text(pair.after);
     html +=
         fmt::format("<figcaption><b>{}</b><span>{}</span></figcaption></figure>\n", escaped(pair.slot, 100),
-                    before_size == after_size ? after_size : before_size + " → " + after_size);
+                    before_size == after_size ? after_size : fmt::format("{} → {}", before_size, after_size));
   }
   return html + "</div>\n</section>\n";
 }
