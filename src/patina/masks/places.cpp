@@ -22,11 +22,6 @@ constexpr float kEdgeWidth = 0.04f, kCavityDepth = 0.5f, kStreakLength = 0.6f, k
                 kStreakStep = 0.02f;
 constexpr uint64_t kSeed = 0;  // masks do not depend on the run's seed: a repainted one stays right
 
-float smoothstep(float low, float high, float x) {
-  const float t = std::clamp((x - low) / (high - low), 0.0f, 1.0f);
-  return t * t * (3.0f - 2.0f * t);
-}
-
 // The point of the surface that a texel shows.
 struct SurfaceTexel {
   size_t texel = 0;
@@ -108,7 +103,7 @@ float drip_at(const render::Scene& scene, render::SurfacePoint point, float radi
   const vec2 source = vec2(point.p_world.x, point.p_world.z) / (kStreakWidth * radius);
   const float length = kStreakLength * radius * cell_noise(source + vec2(1000.0f));
   if (!(walked < length)) return 0.0f;
-  return smoothstep(0.45f, 0.75f, cell_noise(source)) * (1.0f - walked / length);
+  return glm::smoothstep(0.45f, 0.75f, cell_noise(source)) * (1.0f - walked / length);
 }
 
 // Rays are few, so what they say is noisy from texel to texel, and smoothed before it is judged.
@@ -120,12 +115,12 @@ float strength_of(Place place, float measured) {
   switch (place) {
     case Place::kEdges:
     case Place::kCrevices:
-      return smoothstep(0.15f, 0.6f, measured);
+      return glm::smoothstep(0.15f, 0.6f, measured);
     case Place::kCavities:
-      return smoothstep(0.2f, 0.8f, measured);
+      return glm::smoothstep(0.2f, 0.8f, measured);
     case Place::kUp:
     case Place::kDown:
-      return smoothstep(0.1f, 0.8f, measured);
+      return glm::smoothstep(0.1f, 0.8f, measured);
     case Place::kDrips:
       break;
   }

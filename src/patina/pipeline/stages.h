@@ -24,10 +24,10 @@ struct RenderedViews {
   std::vector<Image> normal;  // [H,W,3] in the protocol of ControlNet normalbae
 };
 
-/// Combines the masks into strengths → masks/NN_<material>.png, one grey picture a material that has some,
-/// and sets bench.strength and, where a material keeps every texel, bench.enhanced. Does nothing without
-/// masks. Throws Error for materials that the asset does not have, pictures that are no masks, and masks that
-/// leave nothing to change or nothing that a camera sees.
+/// Combines the masks into strengths → masks/NN_<material>_strength.png, one grey picture a material that has
+/// some, and sets bench.strength and, where a material keeps every texel, bench.enhanced. Does nothing
+/// without masks. Throws Error for materials that the asset does not have, pictures that are no masks, and
+/// masks that leave nothing to change or nothing that a camera sees.
 void mask_stage(Workbench& bench, const MaskSettings& settings, RunFolder& run, const RunProgress& progress);
 
 /// Renders the views → views/tile_NN.png, views/normal_NN.png, views/radiance_NN.exr, views/cameras.json.

@@ -24,8 +24,7 @@ std::string where(std::span<const MaskPicture> masks, std::span<const Image> vie
   if (masks.empty() && views.empty()) return "";
   std::string html =
       "<section>\n<h2>Where it may change</h2>\n<p class=\"lead\">White is edited fully, grey with that "
-      "share "
-      "of the strength, black keeps what is there.</p>\n";
+      "share of the strength, black keeps what is there.</p>\n";
   if (!masks.empty()) {
     html += "<h3>On the textures</h3>\n<div class=\"masks\">\n";
     for (const MaskPicture& mask : masks)
