@@ -11,6 +11,7 @@
 
 #include "patina/base/parallel.h"
 #include "patina/correspond/noise_projection.h"
+#include "patina/render/triangle.h"
 
 namespace patina::correspond {
 namespace {
@@ -30,7 +31,7 @@ std::vector<int32_t> landing_cells(const render::Scene& scene, const render::Cam
       const int64_t stop = std::min(end, field.first_point(index + 1));
       if (point >= stop) continue;
       const SurfaceField::TriangleRef ref = field.triangle(index);
-      const views::Triangle triangle = views::triangle_of(scene, ref.primitive, ref.triangle);
+      const render::Triangle triangle = render::triangle_of(*scene.primitives()[ref.primitive], ref.triangle);
       const auto material = static_cast<size_t>(scene.primitives()[ref.primitive]->material);
       const asset::MaterialMaps& maps = scene.materials()[material];
       const bool see_through = maps.alpha_mode != asset::AlphaMode::kOpaque;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "patina/base/random.h"
-#include "patina/views/visibility.h"
+#include "patina/render/triangle.h"
 
 namespace patina::correspond {
 
@@ -18,7 +18,7 @@ SurfaceField::SurfaceField(const render::Scene& scene, double points_per_area, i
     const size_t count = scene.primitives()[p]->triangles.size();
     for (uint32_t triangle = 0; triangle < count; ++triangle) {
       triangles_.push_back({p, triangle});
-      const float area = views::triangle_of(scene, p, triangle).area();
+      const float area = render::triangle_of(*scene.primitives()[p], triangle).area();
       area_up_to.push_back(area_up_to.back() + (std::isfinite(area) ? static_cast<double>(area) : 0.0));
     }
   }

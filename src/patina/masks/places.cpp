@@ -12,6 +12,7 @@
 #include "patina/base/random.h"
 #include "patina/masks/padding.h"
 #include "patina/masks/surface_shape.h"
+#include "patina/render/triangle.h"
 #include "patina/views/strength_views.h"
 
 namespace patina::masks {
@@ -46,10 +47,7 @@ std::vector<SurfaceTexel> surface_of(const render::Scene& scene, const asset::Ma
 
 // The point of a hit as a ray from its front meets it.
 render::SurfacePoint front_of(const render::Scene& scene, const render::Hit& hit) {
-  const asset::Primitive& primitive = *scene.primitives()[hit.primitive];
-  const uvec3& corner = primitive.triangles[hit.triangle];
-  const auto& p = primitive.p_world;
-  const vec3 cross = glm::cross(p[corner.y] - p[corner.x], p[corner.z] - p[corner.x]);
+  const vec3 cross = render::triangle_of(*scene.primitives()[hit.primitive], hit.triangle).cross();
   const float length = glm::length(cross);
   render::Ray ray;
   ray.direction = length > 0.0f ? -cross / length : vec3(0, -1, 0);

@@ -6,6 +6,7 @@
 #include "patina/base/random.h"
 #include "patina/render/frame.h"
 #include "patina/render/sampling.h"
+#include "patina/render/triangle.h"
 
 namespace patina::masks {
 namespace {
@@ -42,9 +43,7 @@ float bends_away(const render::Scene& scene, const render::SurfacePoint& point, 
            const auto hit = scene.intersect(ray);
            if (!hit || static_cast<int>(hit->primitive) >= scene.num_asset_primitives()) return 0.0f;
            const asset::Primitive& primitive = *scene.primitives()[hit->primitive];
-           const uvec3& corner = primitive.triangles[hit->triangle];
-           const auto& p = primitive.p_world;
-           vec3 outward = glm::cross(p[corner.y] - p[corner.x], p[corner.z] - p[corner.x]);
+           vec3 outward = render::triangle_of(primitive, hit->triangle).cross();
            const float length = glm::length(outward);
            if (!(length > 0.0f)) return 0.0f;
            outward /= glm::dot(outward, direction) < 0.0f ? -length : length;  // the ray leaves there
@@ -58,14 +57,10 @@ float relief(const render::Scene& scene, const render::Hit& hit, const render::S
   const auto set = static_cast<size_t>(map.uv_set);
   if (map.texels.num_pixels() == 1 || set >= point.num_uv_sets) return 0.0f;
   const asset::Primitive& primitive = *scene.primitives()[hit.primitive];
-  const uvec3& corner = primitive.triangles[hit.triangle];
-  const auto& p = primitive.p_world;
-  const vec2 uv = asset::map_uv(map, point.uv[set]), a = asset::map_uv(map, primitive.uv[set][corner.x]),
-             b = asset::map_uv(map, primitive.uv[set][corner.y]) - a,
-             c = asset::map_uv(map, primitive.uv[set][corner.z]) - a;
-  const float area = glm::length(glm::cross(p[corner.y] - p[corner.x], p[corner.z] - p[corner.x]));
+  const float area = render::triangle_of(primitive, hit.triangle).area();
   if (!(area > 0.0f)) return 0.0f;
-  const float step = distance * std::sqrt(std::abs(b.x * c.y - b.y * c.x) / area);  // in UV
+  const vec2 uv = asset::map_uv(map, point.uv[set]);
+  const float step = distance * std::sqrt(render::uv_area(primitive, hit.triangle, map) / area);  // in UV
   const auto tilt = [&](float du, float dv) { return asset::sample3(map, uv + vec2(du, dv)); };
   // The map's green points up, against v.
   return 0.5f * (tilt(step, 0).x - tilt(-step, 0).x + tilt(0, -step).y - tilt(0, step).y);

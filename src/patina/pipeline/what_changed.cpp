@@ -4,6 +4,7 @@
 
 #include "patina/asset/map_slots.h"
 #include "patina/image/color.h"
+#include "patina/render/triangle.h"
 #include "patina/views/visibility.h"
 
 namespace patina::pipeline {
@@ -24,9 +25,9 @@ vec3 surface_mean(const asset::Asset& asset, size_t material, const asset::Map& 
   for (const asset::Primitive& part : asset.primitives) {
     if (static_cast<size_t>(part.material) != material) continue;
     const auto set = static_cast<size_t>(map.uv_set);
-    for (const uvec3& corner : part.triangles) {
-      const vec3 a = part.p_world[corner.x], b = part.p_world[corner.y], c = part.p_world[corner.z];
-      const double weight = 0.5 * glm::length(glm::cross(b - a, c - a)) / static_cast<double>(points);
+    for (uint32_t t = 0; t < part.triangles.size(); ++t) {
+      const uvec3& corner = part.triangles[t];
+      const double weight = render::triangle_of(part, t).area() / static_cast<double>(points);
       for (size_t i = 0; i < points; ++i) {
         // Additive recurrence: points that spread evenly for any number of them [Roberts2018].
         const auto n = static_cast<float>(i + 1);

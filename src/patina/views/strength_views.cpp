@@ -6,6 +6,7 @@
 #include "patina/asset/strength_map.h"
 #include "patina/base/check.h"
 #include "patina/base/parallel.h"
+#include "patina/render/triangle.h"
 
 namespace patina::views {
 namespace {
@@ -28,15 +29,10 @@ Levels levels_of(const asset::Map& map) {
 // Texels of `map`, a side, that a square of `side` pixels shows at a hit.
 float texels_across(const render::Camera& camera, const render::Ray& ray, const render::Hit& hit,
                     const asset::Primitive& primitive, const asset::Map& map, float side) {
-  const uvec3& corner = primitive.triangles[hit.triangle];
-  const auto& p = primitive.p_world;
-  const auto& uv = primitive.uv[static_cast<size_t>(map.uv_set)];
-  const vec3 cross = glm::cross(p[corner.y] - p[corner.x], p[corner.z] - p[corner.x]);
-  const vec2 a = asset::map_uv(map, uv[corner.x]), b = asset::map_uv(map, uv[corner.y]) - a,
-             c = asset::map_uv(map, uv[corner.z]) - a;
-  const float area = glm::length(cross), uv_area = std::abs(b.x * c.y - b.y * c.x);
+  const render::Triangle triangle = render::triangle_of(primitive, hit.triangle);
+  const float area = triangle.area(), uv_area = render::uv_area(primitive, hit.triangle, map);
   if (!(area > 0.0f && uv_area > 0.0f)) return 1.0f;
-  const float cosine = std::max(std::abs(glm::dot(cross, ray.direction)) / area, 0.05f);
+  const float cosine = std::max(0.5f * std::abs(glm::dot(triangle.cross(), ray.direction)) / area, 0.05f);
   const float width = side * hit.t / camera.focal_pixels();
   return std::sqrt(static_cast<float>(map.texels.num_pixels()) * uv_area / area * width * width / cosine);
 }

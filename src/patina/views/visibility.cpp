@@ -6,20 +6,15 @@
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
 #include "patina/base/random.h"
+#include "patina/render/triangle.h"
 #include "patina/views/view_set.h"
 
 namespace patina::views {
 
-Triangle triangle_of(const render::Scene& scene, uint32_t primitive, uint32_t triangle) {
-  const asset::Primitive& mesh = *scene.primitives()[primitive];
-  const uvec3 corner = mesh.triangles[triangle];
-  return {mesh.p_world[corner.x], mesh.p_world[corner.y], mesh.p_world[corner.z]};
-}
-
 std::optional<FrontHit> front_hit(const render::Scene& scene, const render::Ray& ray) {
   const std::optional<render::Hit> hit = scene.intersect(ray);
   if (!hit || static_cast<int>(hit->primitive) >= scene.num_asset_primitives()) return std::nullopt;
-  const Triangle triangle = triangle_of(scene, hit->primitive, hit->triangle);
+  const render::Triangle triangle = render::triangle_of(*scene.primitives()[hit->primitive], hit->triangle);
   const vec3 cross = triangle.cross();
   const float length = glm::length(cross);
   if (!(length > 0.0f)) return std::nullopt;  // a needle without a normal has no front
@@ -82,7 +77,7 @@ class SurfacePoints {
       if (material >= 0 && mesh.material != material) continue;
       for (size_t triangle = 0; triangle < mesh.triangles.size(); ++triangle) {
         const Place place{static_cast<uint32_t>(primitive), static_cast<uint32_t>(triangle)};
-        area_ += triangle_of(scene, place.primitive, place.triangle).area();
+        area_ += render::triangle_of(*scene.primitives()[place.primitive], place.triangle).area();
         places_.push_back(place);
         area_up_to_.push_back(area_);
       }
@@ -101,7 +96,8 @@ class SurfacePoints {
     const auto upper = std::upper_bound(area_up_to_.begin(), area_up_to_.end(), at);
     const Place place =
         places_[std::min(static_cast<size_t>(upper - area_up_to_.begin()), places_.size() - 1)];
-    const Triangle triangle = triangle_of(scene_, place.primitive, place.triangle);
+    const render::Triangle triangle =
+        render::triangle_of(*scene_.primitives()[place.primitive], place.triangle);
     vec2 barycentric = random.uniform2();
     if (barycentric.x + barycentric.y > 1.0f) barycentric = vec2(1.0f) - barycentric;
     const int owner = scene_.primitives()[place.primitive]->material;

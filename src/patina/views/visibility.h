@@ -12,15 +12,6 @@ namespace patina::views {
 /// covers the rounding of single-precision positions (1e-7) and of Embree's hits at grazing angles.
 inline constexpr float kVisibilityTolerance = 1e-4f;
 
-/// Corners of a triangle in world space, and what follows from them.
-struct Triangle {
-  vec3 a, b, c;
-  vec3 cross() const { return glm::cross(b - a, c - a); }  // outward normal times twice the area
-  float area() const { return 0.5f * glm::length(cross()); }
-  vec3 at(const vec2& barycentric) const { return a + barycentric.x * (b - a) + barycentric.y * (c - a); }
-};
-Triangle triangle_of(const render::Scene& scene, uint32_t primitive, uint32_t triangle);
-
 /// A ray's first surface if the asset (not its context) owns it and shows its front; a double-sided material
 /// has two fronts.
 struct FrontHit {
