@@ -39,7 +39,7 @@ std::vector<Image> AssetEditor::edited(const std::string& name, const std::strin
   pipeline::EditSettings settings = config_.edit;
   settings.options.prompt = prompt;
   RunFolder run(folder_ / name);
-  return edit_stage(bench_, views_, settings, model_, run, {});
+  return edit_stage(bench_, unmasked(bench_), views_, settings, model_, run, {});
 }
 
 }  // namespace patina::bench

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "in_process.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/correspond/consistency.h"
@@ -13,6 +14,7 @@
 #include "patina/pipeline/enhance.h"
 #include "patina/report/report.h"
 #include "process.h"
+#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::pipeline {
@@ -23,10 +25,9 @@ using nlohmann::json;
 using test::TemporaryFolder;
 
 std::vector<std::string> ablate_command(const fs::path& folder, const std::vector<std::string>& more = {}) {
-  const fs::path kettle = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
   std::vector<std::string> command{test::built_program("patina").string(),
                                    "ablate",
-                                   kettle.string(),
+                                   test::small_kettle().string(),
                                    "-p",
                                    "a rusty old kettle",
                                    "-m",
@@ -99,7 +100,7 @@ TEST(Ablate, shows_every_step_with_the_numbers_of_its_run_folder) {
     for (size_t v = 0; v < edited.size(); ++v)
       sharpness += report::sharpness_kept(
           edited[v], views.tile[v],
-          inverse::loss_weight(views.set.views[v].gbuffer, bench.enhanced, config.report.boundary_pixels));
+          inverse::loss_weight(views.set.views[v].gbuffer, bench.chosen, config.report.boundary_pixels));
     EXPECT_NEAR(step.at("edit_sharpness").get<double>(), sharpness / static_cast<double>(edited.size()),
                 1e-5);
     const json metrics = read_json(run.file("metrics.json"));
@@ -242,7 +243,7 @@ TEST(Ablate, wrong_usage_is_named_and_leaves_nothing_behind) {
   const fs::path out = folder.path() / "out";
   const auto expect_refused = [&](int exit_code, const std::vector<std::string>& command,
                                   const std::string& word) {
-    const test::ProcessResult result = test::run_process(command, {.seconds = 60});
+    const test::ProcessResult result = test::patina({command.begin() + 1, command.end()});
     EXPECT_EQ(result.exit_code, exit_code) << result.error;
     EXPECT_NE(result.error.find(word), std::string::npos) << result.error;
     EXPECT_FALSE(fs::exists(out)) << result.error;

@@ -29,8 +29,8 @@ Image option_sheet(const OptionSheet& sheet, const std::vector<pipeline::Config>
       option.set(changed, pipeline::value_of_texts(option, std::span(&value, 1)));
       pipeline::RunFolder run(folder / config.inputs.asset.stem() / (sheet.option + "-" + value));
       run.adopt_stage(renders, "render");
-      pictures.push_back(pipeline::edit_stage(bench, views, changed.edit, *model, run,
-                                              {progress})[static_cast<size_t>(view)]);
+      pictures.push_back(pipeline::edit_stage(bench, pipeline::unmasked(bench), views, changed.edit, *model,
+                                              run, {progress})[static_cast<size_t>(view)]);
     }
   }
   return report::contact_sheet(pictures, static_cast<int>(sheet.values.size()) + 1, side);

@@ -61,17 +61,17 @@ RunProgress of_all_steps(const RunProgress& progress, std::string_view task, siz
 
 // Numbers that need the edited views alone: how well they agree, and how much detail they have over the
 // renders.
-void measure_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                   Run& run, const RunProgress& progress) {
+void measure_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                   std::span<const Image> edited, Run& run, const RunProgress& progress) {
   const int boundary_pixels = run.step.config.report.boundary_pixels;
   const std::string key = StageKey(bench)
-                              .add_materials(bench)
+                              .add_materials(strength.enhanced)
                               .add(fmt::format("{}", boundary_pixels))
                               .add(views.tile)
                               .add(edited)
                               .hash();
   run.folder->run_stage("measure", key, progress, [&] {
-    const std::vector<Image> weights = measure_weights(bench, views, boundary_pixels);
+    const std::vector<Image> weights = measure_weights(strength, views, boundary_pixels);
     return RunFolder::StageResult{
         .outputs = {},
         .metrics = {{"consistency", consistency_metrics(bench, views, edited)},
@@ -197,12 +197,12 @@ void check_asset_and_point(const Config& config, const AblationOptions& options,
 // on. Asset and G-buffers go when this returns, so that they do not count as another stage's memory.
 void edit(std::span<Run> runs, std::string_view told_as, size_t first, size_t count, ResolvedModel& model,
           const RunProgress& progress) {
-  Workbench bench = open_workbench(runs[0].step.config.inputs, progress);
-  mask_stage(bench, runs[0].step.config.masks, *runs[0].folder, progress);
+  const Workbench bench = open_workbench(runs[0].step.config.inputs, progress);
+  const Strength strength = mask_stage(bench, runs[0].step.config.masks, *runs[0].folder, progress);
   const RenderedViews views = render_stage(bench, runs[0].step.config.render, *runs[0].folder, progress);
   for (size_t i = 0; i < runs.size(); ++i) {
     for (const char* stage : {"masks", "render"}) runs[i].folder->adopt_stage(*runs[0].folder, stage);
-    edit_stage(bench, views, runs[i].step.config.edit, model, *runs[i].folder,
+    edit_stage(bench, strength, views, runs[i].step.config.edit, model, *runs[i].folder,
                of_all_steps(progress, "detail", first + i, count, told_as));
   }
 }
@@ -288,17 +288,17 @@ json ablate(Config config, const AblationOptions& options, const fs::path& folde
     edit({&more_runs[i], 1}, "more views", i, more_runs.size(), model, once);
   model.unload();
 
-  Workbench bench = open_workbench(runs[0].step.config.inputs, once);
-  mask_stage(bench, runs[0].step.config.masks, *runs[0].folder, once);
+  const Workbench bench = open_workbench(runs[0].step.config.inputs, once);
+  const Strength strength = mask_stage(bench, runs[0].step.config.masks, *runs[0].folder, once);
   const RenderedViews views = load_views(bench, *runs[0].folder);
   for (size_t i = 0; i < runs.size(); ++i) {
     const std::vector<Image> edited = load_edited(views, *runs[i].folder);
-    measure_stage(bench, views, edited, runs[i], once);
+    measure_stage(bench, strength, views, edited, runs[i], once);
     if (!options.fit) continue;
     const RunProgress inner = of_all_steps(once, "fit", i, runs.size(), "fit steps");
     const FittedMaterials fitted =
-        fit_stage(bench, views, edited, runs[i].step.config.fit, *runs[i].folder, inner);
-    report_stage(bench, views, edited, fitted, runs[i].step.config.report, *runs[i].folder, inner);
+        fit_stage(bench, strength, views, edited, runs[i].step.config.fit, *runs[i].folder, inner);
+    report_stage(bench, strength, views, edited, fitted, runs[i].step.config.report, *runs[i].folder, inner);
   }
 
   report::AblationPage page = make_page(bench, views, runs, options, config);

@@ -32,16 +32,18 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   check_inputs(config);
   ResolvedModel model(config.edit);
   write_config(config, run);
-  Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
+  const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
   check_export(bench, config.output, progress);
-  mask_stage(bench, config.masks, run, progress);                                 // → masks/
+  const Strength strength = mask_stage(bench, config.masks, run, progress);       // → masks/
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
-  const std::vector<Image> edited = edit_stage(bench, views, config.edit, model, run, progress);  // → detail/
+  const std::vector<Image> edited =
+      edit_stage(bench, strength, views, config.edit, model, run, progress);  // → detail/
   model.unload();
-  FittedMaterials fitted = fit_stage(bench, views, edited, config.fit, run, progress);  // → textures/
+  FittedMaterials fitted =
+      fit_stage(bench, strength, views, edited, config.fit, run, progress);  // → textures/
   fitted = blended(bench, std::move(fitted), config.blend);
-  write_output(bench, fitted, config.output);                                // → the asset
-  report_stage(bench, views, edited, fitted, config.report, run, progress);  // → report.html
+  write_output(bench, fitted, config.output);                                          // → the asset
+  report_stage(bench, strength, views, edited, fitted, config.report, run, progress);  // → report.html
 }
 
 void run_render(Config config, RunFolder& run, const RunProgress& progress) {
@@ -57,32 +59,32 @@ void run_edit(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   ResolvedModel model(config.edit);
   write_config(config, run);
-  Workbench bench = open_workbench(config.inputs, progress);
-  mask_stage(bench, config.masks, run, progress);
-  edit_stage(bench, load_views(bench, run), config.edit, model, run, progress);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  const Strength strength = mask_stage(bench, config.masks, run, progress);
+  edit_stage(bench, strength, load_views(bench, run), config.edit, model, run, progress);
 }
 
 void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   check_output(config.output);
   write_config(config, run);
-  Workbench bench = open_workbench(config.inputs, progress);
+  const Workbench bench = open_workbench(config.inputs, progress);
   check_export(bench, config.output, progress);
-  mask_stage(bench, config.masks, run, progress);
+  const Strength strength = mask_stage(bench, config.masks, run, progress);
   const RenderedViews views = load_views(bench, run);
   const std::vector<Image> edited = load_edited(views, run);
-  FittedMaterials fitted = fit_stage(bench, views, edited, config.fit, run, progress);
+  FittedMaterials fitted = fit_stage(bench, strength, views, edited, config.fit, run, progress);
   write_output(bench, blended(bench, std::move(fitted), config.blend), config.output);
 }
 
 void run_report(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   write_config(config, run);
-  Workbench bench = open_workbench(config.inputs, progress);
-  mask_stage(bench, config.masks, run, progress);
+  const Workbench bench = open_workbench(config.inputs, progress);
+  const Strength strength = mask_stage(bench, config.masks, run, progress);
   const RenderedViews views = load_views(bench, run);
   const FittedMaterials fitted = blended(bench, load_fitted(bench, run), config.blend);
-  report_stage(bench, views, load_edited(views, run), fitted, config.report, run, progress);
+  report_stage(bench, strength, views, load_edited(views, run), fitted, config.report, run, progress);
 }
 
 void check_inputs(const Config& config) {

@@ -5,10 +5,11 @@
 
 namespace patina::pipeline {
 
-std::vector<Image> measure_weights(const Workbench& bench, const RenderedViews& views, int boundary_pixels) {
+std::vector<Image> measure_weights(const Strength& strength, const RenderedViews& views,
+                                   int boundary_pixels) {
   std::vector<Image> weights;
   for (const views::View& view : views.set.views)
-    weights.push_back(inverse::loss_weight(view.gbuffer, bench.enhanced, boundary_pixels));
+    weights.push_back(inverse::loss_weight(view.gbuffer, strength.enhanced, boundary_pixels));
   return weights;
 }
 

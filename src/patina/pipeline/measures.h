@@ -16,7 +16,7 @@ inline nlohmann::json json_number(double value) {
 }
 
 /// The loss's weights, one [H,W,1] image a view, so that untrusted silhouettes do not count.
-std::vector<Image> measure_weights(const Workbench& bench, const RenderedViews& views, int boundary_pixels);
+std::vector<Image> measure_weights(const Strength& strength, const RenderedViews& views, int boundary_pixels);
 
 /// Mean over the views of a measure between two pictures under such weights; views in which nothing counts
 /// (NaN) are left out, NaN if that is all.

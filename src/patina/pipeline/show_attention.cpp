@@ -59,7 +59,7 @@ ShownAttention show_attention(Config config, const AttentionOptions& options, Ru
 
   const RenderedViews views = render_stage(bench, config.render, run, progress);
   const PickedPoint point = pick_point(*bench.scene, views.set, options.point);
-  const PreparedEdit prepared = prepare_edit(bench, views, config.edit, model, progress);
+  const PreparedEdit prepared = prepare_edit(bench, unmasked(bench), views, config.edit, model, progress);
   ShownAttention shown;
   shown.negative_prompt = diffusion::guidance_of(model, config.edit.options).negative_prompt;
   shown.captured = diffusion::capture_attention(model, prepared.inputs, config.edit.options, layer,

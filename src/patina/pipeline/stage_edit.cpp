@@ -20,12 +20,12 @@ using nlohmann::json;
 
 namespace {
 
-std::string edit_key(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
-                     const ResolvedModel& model) {
+std::string edit_key(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                     const EditSettings& settings, const ResolvedModel& model) {
   return StageKey(bench, settings)
       .add(views.tile)
       .add(views.normal)
-      .add_strength(bench)
+      .add_strength(strength)
       .add(model.hash())
       .hash();
 }
@@ -104,8 +104,9 @@ void warn_of_memory(const diffusion::EditMemory& memory, const EditSettings& set
 
 }  // namespace
 
-PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
-                          const diffusion::Model& model, const RunProgress& progress) {
+PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                          const EditSettings& settings, const diffusion::Model& model,
+                          const RunProgress& progress) {
   const int scale = model.latent_scale();
   if (bench.cameras[0].width % scale || bench.cameras[0].height % scale)
     throw Error(ErrorCode::kUsage, "resolution", fmt::format("this model needs a multiple of {}", scale));
@@ -129,7 +130,7 @@ PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, co
                      .normal_views = views.normal,
                      .noise = std::move(noise),
                      .bias_levels = {},
-                     .strength_views = bench.strength.views};
+                     .strength_views = strength.views};
   if (settings.options.bias_weight != 0) {
     start = Clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
@@ -138,17 +139,17 @@ PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, co
   return prepared;
 }
 
-std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views,
+std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
                               const EditSettings& settings, ResolvedModel& resolved, RunFolder& run,
                               const RunProgress& progress) {
-  const std::string key = edit_key(bench, views, settings, resolved);
+  const std::string key = edit_key(bench, strength, views, settings, resolved);
   run.run_stage("detail", key, progress, [&] {
     const auto start = Clock::now();
     const int64_t bytes_before = resident_bytes();
     const bool loads = !resolved.is_loaded();  // else its weights are among the bytes before
     const diffusion::Model& model = resolved.loaded();
     const double load_seconds = seconds_since(start);
-    const PreparedEdit prepared = prepare_edit(bench, views, settings, model, progress);
+    const PreparedEdit prepared = prepare_edit(bench, strength, views, settings, model, progress);
 
     const diffusion::EditOptions& options = settings.options;
     const diffusion::EditMemory memory = diffusion::predict_memory(
@@ -165,14 +166,14 @@ std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views
     RunFolder::StageResult result;
     for (size_t v = 0; v < edited.size(); ++v) {
       restore_surroundings(edited[v], views.tile[v], views.set.views[v].gbuffer.coverage);
-      if (!bench.strength.views.empty())
-        restore_masked(edited[v], views.tile[v], bench.strength.views[v], model.latent_scale());
+      if (!strength.views.empty())
+        restore_masked(edited[v], views.tile[v], strength.views[v], model.latent_scale());
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
       write_image(run.file(result.outputs.back()), edited[v]);
     }
-    for (size_t v = 0; v < bench.strength.views.size(); ++v) {
+    for (size_t v = 0; v < strength.views.size(); ++v) {
       result.outputs.push_back(numbered("detail/strength", v, ".png"));
-      write_image(run.file(result.outputs.back()), strength_picture(bench.strength.views[v]));
+      write_image(run.file(result.outputs.back()), strength_picture(strength.views[v]));
     }
     const diffusion::Guidance guidance = diffusion::guidance_of(model, options);
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model.latent_channels());

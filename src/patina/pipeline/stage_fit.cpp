@@ -64,11 +64,11 @@ bool restore_untouched(Image& texels, const Image& picture, const Image& before,
   return any;
 }
 
-std::string fit_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                    const FitSettings& settings) {
+std::string fit_key(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                    std::span<const Image> edited, const FitSettings& settings) {
   return StageKey(bench, settings)
-      .add_materials(bench)
-      .add_strength(bench)
+      .add_materials(strength.enhanced)
+      .add_strength(strength)
       .add(views.set.exposure_ev)
       .add(edited)
       .hash();
@@ -83,9 +83,10 @@ std::string material_file(const char* folder, size_t material, const std::string
   return fmt::format("{}/{:02}_{}_{}.png", folder, material, safe, what);
 }
 
-FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                          const FitSettings& settings, RunFolder& run, const RunProgress& progress) {
-  const std::string key = fit_key(bench, views, edited, settings);
+FittedMaterials fit_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                          std::span<const Image> edited, const FitSettings& settings, RunFolder& run,
+                          const RunProgress& progress) {
+  const std::string key = fit_key(bench, strength, views, edited, settings);
   run.run_stage("fit", key, progress, [&] {
     inverse::FitHooks hooks;
     hooks.on_checkpoint = [&](const inverse::FitCheckpoint& c) {
@@ -108,7 +109,7 @@ FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, st
       (void)write_maps(so_far.maps, so_far.changed, run, kPreviewFolder);
     };
     const inverse::FitResult fitted =
-        inverse::fit_materials(*bench.scene, {views.set, edited, bench.enhanced, bench.strength.maps},
+        inverse::fit_materials(*bench.scene, {views.set, edited, strength.enhanced, strength.maps},
                                settings.options, hooks, progress);
 
     RunFolder::StageResult result;

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "patina/base/files.h"
+#include "patina/pipeline/stages.h"
 
 namespace patina::pipeline {
 namespace {
@@ -161,14 +162,14 @@ StageKey& StageKey::add(std::span<const Image> images) {
   return *this;
 }
 
-StageKey& StageKey::add_materials(const Workbench& bench) {
+StageKey& StageKey::add_materials(const std::vector<bool>& enhanced) {
   std::string text;
-  for (const bool enhanced : bench.enhanced) text += enhanced ? '1' : '0';
+  for (const bool may_change : enhanced) text += may_change ? '1' : '0';
   return add(text);
 }
 
-StageKey& StageKey::add_strength(const Workbench& bench) {
-  for (const asset::Map& map : bench.strength.maps) add(map.texels);
+StageKey& StageKey::add_strength(const Strength& strength) {
+  for (const asset::Map& map : strength.maps) add(map.texels);
   return *this;
 }
 

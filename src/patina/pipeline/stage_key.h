@@ -13,6 +13,8 @@
 
 namespace patina::pipeline {
 
+struct Strength;
+
 /// A text of every field's value. Equal for equal settings, different for different ones.
 std::string text_of(const RenderSettings& settings);
 std::string text_of(const MaskSettings& settings);
@@ -34,9 +36,9 @@ class StageKey {
   StageKey& add(const Image& image);
   StageKey& add(std::span<const Image> images);
   /// How strongly each texel may change: nothing where there are no masks.
-  StageKey& add_strength(const Workbench& bench);
+  StageKey& add_strength(const Strength& strength);
   /// Which materials may change: read by the stages that look at the enhanced surface alone.
-  StageKey& add_materials(const Workbench& bench);
+  StageKey& add_materials(const std::vector<bool>& enhanced);
 
   std::string hash() const;
 

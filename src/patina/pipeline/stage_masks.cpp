@@ -31,10 +31,10 @@ struct MaskFile {
   bool for_all = false;
 };
 
-// "FILE" or "MATERIAL=FILE"; both names may hold '='.
-MaskFile parsed(const std::string& text, const Workbench& bench) {
+// "FILE" or "MATERIAL=FILE"; both names may hold '='. A file without a name is for all that may change.
+MaskFile parsed(const std::string& text, const Workbench& bench, const std::vector<bool>& may_change) {
   std::error_code ignored;
-  if (text.find('=') == std::string::npos || fs::exists(text, ignored)) return {text, bench.enhanced, true};
+  if (text.find('=') == std::string::npos || fs::exists(text, ignored)) return {text, may_change, true};
   for (size_t at = text.find('='); at != std::string::npos; at = text.find('=', at + 1)) {
     const std::string name = text.substr(0, at);
     const bool last = text.find('=', at + 1) == std::string::npos;
@@ -47,7 +47,7 @@ MaskFile parsed(const std::string& text, const Workbench& bench) {
     MaskFile mask{text.substr(at + 1),
                   named_materials(bench.asset, {known ? name : text.substr(0, text.find('='))}, "mask")};
     for (size_t m = 0; m < mask.materials.size(); ++m)
-      if (mask.materials[m] && !bench.enhanced[m])
+      if (mask.materials[m] && !may_change[m])
         throw Error(ErrorCode::kUsage, "mask",
                     fmt::format("material '{}' is not one of those that may change, so it can have no mask",
                                 printable(name)));
@@ -56,10 +56,11 @@ MaskFile parsed(const std::string& text, const Workbench& bench) {
   return {};
 }
 
-std::vector<MaskFile> parsed(const std::vector<std::string>& texts, const Workbench& bench) {
+std::vector<MaskFile> parsed(const std::vector<std::string>& texts, const Workbench& bench,
+                             const std::vector<bool>& may_change) {
   std::vector<MaskFile> files;
   files.reserve(texts.size());
-  for (const std::string& text : texts) files.push_back(parsed(text, bench));
+  for (const std::string& text : texts) files.push_back(parsed(text, bench, may_change));
   return files;
 }
 
@@ -130,10 +131,11 @@ ivec2 made_size(const asset::Map& texture) {
   return glm::clamp(ivec2(texture.texels.width, texture.texels.height), kMinMadeSide, kMaxMadeSide);
 }
 
-void multiply_vertex_colors(const Workbench& bench, std::vector<std::optional<asset::Map>>& maps) {
+void multiply_vertex_colors(const Workbench& bench, const std::vector<bool>& may_change,
+                            std::vector<std::optional<asset::Map>>& maps) {
   bool any = false;
   for (size_t m = 0; m < maps.size(); ++m) {
-    if (!bench.enhanced[m]) continue;
+    if (!may_change[m]) continue;
     const asset::Map& like = bench.maps[m].base_color;
     const ivec2 size = made_size(like);
     auto colors = masks::vertex_color_strength(views::asset_primitives(*bench.scene), like, size.x, size.y,
@@ -148,8 +150,9 @@ void multiply_vertex_colors(const Workbench& bench, std::vector<std::optional<as
 }
 
 // One map a material; nullopt where nothing masks it.
-std::vector<std::optional<asset::Map>> combined(const Workbench& bench, const MaskSettings& settings,
-                                                std::span<const MaskFile> files, const Progress& progress) {
+std::vector<std::optional<asset::Map>> combined(const Workbench& bench, const std::vector<bool>& may_change,
+                                                const MaskSettings& settings, std::span<const MaskFile> files,
+                                                const Progress& progress) {
   std::vector<std::optional<asset::Map>> maps(bench.maps.size());
   for (const MaskFile& file : files) {
     const Image mask = read_grey(file.path);
@@ -157,9 +160,9 @@ std::vector<std::optional<asset::Map>> combined(const Workbench& bench, const Ma
     for (size_t m = 0; m < maps.size(); ++m)
       if (file.materials[m]) multiply(maps[m], laid_out(bench, m, mask));
   }
-  if (settings.vertex_color) multiply_vertex_colors(bench, maps);
+  if (settings.vertex_color) multiply_vertex_colors(bench, may_change, maps);
   for (size_t m = 0; m < maps.size() && !settings.where.empty(); ++m) {
-    if (!bench.enhanced[m]) continue;
+    if (!may_change[m]) continue;
     const asset::Map& like = bench.maps[m].base_color;
     const ivec2 size = made_size(like);
     multiply(maps[m], masks::place_strength(*bench.scene, like, size.x, size.y, static_cast<int>(m),
@@ -168,9 +171,10 @@ std::vector<std::optional<asset::Map>> combined(const Workbench& bench, const Ma
   return maps;
 }
 
-std::string mask_key(const Workbench& bench, const MaskSettings& settings, std::span<const MaskFile> files) {
+std::string mask_key(const Workbench& bench, const std::vector<bool>& may_change,
+                     const MaskSettings& settings, std::span<const MaskFile> files) {
   StageKey key(bench, settings);
-  key.add_materials(bench);
+  key.add_materials(may_change);
   for (const MaskFile& file : files) key.add(hash_file(file.path));
   return key.hash();
 }
@@ -185,19 +189,22 @@ Error nothing_would_change(const char* why) {
 constexpr const char* kAllBlack =
     "the masks are black on all materials that may change; paint white where the asset shall change";
 
-// Takes the strengths from the run folder, where they may have been repainted.
-void load_strength(Workbench& bench, const StageRecord& record, const RunFolder& run) {
-  for (const bool enhanced : bench.enhanced) bench.strength.maps.push_back(constant(enhanced ? 1.0f : 0.0f));
+// The strengths of the run folder, where they may have been repainted.
+Strength load_strength(const Workbench& bench, std::vector<bool> may_change, const StageRecord& record,
+                       const RunFolder& run) {
+  Strength strength{.enhanced = std::move(may_change), .maps = {}, .views = {}};
+  for (const bool enhanced : strength.enhanced) strength.maps.push_back(constant(enhanced ? 1.0f : 0.0f));
   for (const json& entry : record.metrics.at("maps")) {
     const size_t m = entry.at("material");
-    bench.strength.maps.at(m) = laid_out(bench, m, read_grey(run.file(entry.at("file").get<std::string>())));
-    bench.enhanced[m] = has_strength(bench.strength.maps[m]);
+    strength.maps.at(m) = laid_out(bench, m, read_grey(run.file(entry.at("file").get<std::string>())));
+    strength.enhanced[m] = has_strength(strength.maps[m]);
   }
-  if (std::find(bench.enhanced.begin(), bench.enhanced.end(), true) == bench.enhanced.end())
+  if (std::find(strength.enhanced.begin(), strength.enhanced.end(), true) == strength.enhanced.end())
     throw nothing_would_change(kAllBlack);
-  bench.strength.views = views::strength_views(*bench.scene, bench.cameras, bench.strength.maps);
-  for (const Image& view : bench.strength.views)
-    if (std::any_of(view.pixels.begin(), view.pixels.end(), [](float v) { return v > 0.0f; })) return;
+  strength.views = views::strength_views(*bench.scene, bench.cameras, strength.maps);
+  for (const Image& view : strength.views)
+    if (std::any_of(view.pixels.begin(), view.pixels.end(), [](float v) { return v > 0.0f; }))
+      return strength;
   throw nothing_would_change(
       "no camera sees a place where the masks are not black; check that the masks lie on the UVs of the base "
       "colour, or turn the cameras");
@@ -205,18 +212,26 @@ void load_strength(Workbench& bench, const StageRecord& record, const RunFolder&
 
 }  // namespace
 
-void mask_stage(Workbench& bench, const MaskSettings& settings, RunFolder& run, const RunProgress& progress) {
-  if (!settings.any()) return;
+Strength unmasked(const Workbench& bench) {
+  return {.enhanced = bench.chosen, .maps = {}, .views = {}};
+}
+
+Strength mask_stage(const Workbench& bench, const MaskSettings& settings, RunFolder& run,
+                    const RunProgress& progress) {
+  if (!settings.any()) return unmasked(bench);
+  std::vector<bool> may_change = bench.chosen;
   const std::vector<bool> keeps = named_materials(bench.asset, settings.protect, "protect");
   for (size_t m = 0; m < keeps.size(); ++m)
-    if (keeps[m]) bench.enhanced[m] = false;
-  const std::vector<MaskFile> files = parsed(settings.files, bench);
-  const StageRecord& record = run.run_stage("masks", mask_key(bench, settings, files), progress, [&] {
+    if (keeps[m]) may_change[m] = false;
+  const std::vector<MaskFile> files = parsed(settings.files, bench, may_change);
+  const std::string key = mask_key(bench, may_change, settings, files);
+  const StageRecord& record = run.run_stage("masks", key, progress, [&] {
     RunFolder::StageResult result;
     result.metrics["maps"] = json::array();
-    const std::vector<std::optional<asset::Map>> maps = combined(bench, settings, files, progress);
+    const std::vector<std::optional<asset::Map>> maps =
+        combined(bench, may_change, settings, files, progress);
     bool any = false;
-    for (size_t m = 0; m < maps.size(); ++m) any |= bench.enhanced[m] && (!maps[m] || has_strength(*maps[m]));
+    for (size_t m = 0; m < maps.size(); ++m) any |= may_change[m] && (!maps[m] || has_strength(*maps[m]));
     if (!any) throw nothing_would_change(kAllBlack);
     for (size_t m = 0; m < maps.size(); ++m) {
       if (!maps[m]) continue;
@@ -226,7 +241,7 @@ void mask_stage(Workbench& bench, const MaskSettings& settings, RunFolder& run, 
     }
     return result;
   });
-  load_strength(bench, record, run);
+  return load_strength(bench, std::move(may_change), record, run);
 }
 
 }  // namespace patina::pipeline

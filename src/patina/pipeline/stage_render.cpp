@@ -50,8 +50,8 @@ json coverage_metrics(const Workbench& bench, const RunProgress& progress,
 void require_seen(const Workbench& bench, const views::ViewSet& set) {
   for (const views::View& view : set.views)
     for (const auto material : view.gbuffer.material)
-      if (material >= 0 && static_cast<size_t>(material) < bench.enhanced.size() &&
-          bench.enhanced[static_cast<size_t>(material)])
+      if (material >= 0 && static_cast<size_t>(material) < bench.chosen.size() &&
+          bench.chosen[static_cast<size_t>(material)])
         return;
   throw Error(
       ErrorCode::kFormat, bench.asset.path.string(),

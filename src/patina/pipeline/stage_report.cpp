@@ -28,10 +28,15 @@ std::vector<Image> read_numbered(const RunFolder& run, std::string_view prefix,
   return images;
 }
 
-std::string report_key(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                       const FittedMaterials& fitted, const ReportSettings& settings) {
+std::string report_key(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                       std::span<const Image> edited, const FittedMaterials& fitted,
+                       const ReportSettings& settings) {
   StageKey key(bench, settings);
-  key.add("in two other lights").add_materials(bench).add(views.set.exposure_ev).add(views.tile).add(edited);
+  key.add("in two other lights")
+      .add_materials(strength.enhanced)
+      .add(views.set.exposure_ev)
+      .add(views.tile)
+      .add(edited);
   for (const asset::MaterialMaps& m : fitted.maps)
     for (const asset::MapSlotRow& row : asset::kMapSlots) key.add(slot_map(m, row.slot).texels);
   return key.hash();
@@ -89,10 +94,10 @@ void write_turntable(const Workbench& bench, const render::Scene& after, float e
 }
 
 // Renders the result and measures it.
-RunFolder::StageResult measure_result(const Workbench& bench, const RenderedViews& views,
-                                      std::span<const Image> edited, const FittedMaterials& fitted,
-                                      const ReportSettings& settings, const RunFolder& run,
-                                      const RunProgress& progress) {
+RunFolder::StageResult measure_result(const Workbench& bench, const Strength& strength,
+                                      const RenderedViews& views, std::span<const Image> edited,
+                                      const FittedMaterials& fitted, const ReportSettings& settings,
+                                      const RunFolder& run, const RunProgress& progress) {
   RunFolder::StageResult result;
   const render::Scene after(bench.asset, fitted.maps, bench.scene->environment(), bench.context.get(),
                             {.bsdf_model = bench.scene->bsdf_model()});
@@ -107,7 +112,7 @@ RunFolder::StageResult measure_result(const Workbench& bench, const RenderedView
     result.outputs.push_back(numbered("report/rendered", v, ".png"));
     write_image(run.file(result.outputs.back()), pictures.back());
   }
-  const std::vector<Image> weights = measure_weights(bench, views, settings.boundary_pixels);
+  const std::vector<Image> weights = measure_weights(strength, views, settings.boundary_pixels);
   result.metrics["consistency"] = consistency_metrics(bench, views, edited);
   result.metrics["fit"] = {
       {"psnr", json_number(mean_over_views(pictures, edited, weights, report::psnr))},
@@ -150,10 +155,10 @@ std::vector<report::RelitPictures> relit_pictures(const Workbench& bench, std::s
 }
 
 // The masks of the materials that have one.
-std::vector<report::MaskPicture> mask_pictures(const Workbench& bench) {
+std::vector<report::MaskPicture> mask_pictures(const Workbench& bench, const Strength& strength) {
   std::vector<report::MaskPicture> pictures;
-  for (size_t m = 0; m < bench.strength.maps.size(); ++m)
-    if (const Image& texels = bench.strength.maps[m].texels; texels.num_pixels() > 1)
+  for (size_t m = 0; m < strength.maps.size(); ++m)
+    if (const Image& texels = strength.maps[m].texels; texels.num_pixels() > 1)
       pictures.push_back({bench.maps[m].name, texels});
   return pictures;
 }
@@ -169,12 +174,12 @@ json asked_for(const RunFolder& run) {
 
 }  // namespace
 
-void report_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                  const FittedMaterials& fitted, const ReportSettings& settings, RunFolder& run,
-                  const RunProgress& progress) {
-  const std::string key = report_key(bench, views, edited, fitted, settings);
+void report_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                  std::span<const Image> edited, const FittedMaterials& fitted,
+                  const ReportSettings& settings, RunFolder& run, const RunProgress& progress) {
+  const std::string key = report_key(bench, strength, views, edited, fitted, settings);
   const StageRecord& record = run.run_stage("report", key, progress, [&] {
-    return measure_result(bench, views, edited, fitted, settings, run, progress);
+    return measure_result(bench, strength, views, edited, fitted, settings, run, progress);
   });
 
   // The page is made anew every time: it is cheap, and shows stages that ran again.
@@ -191,8 +196,8 @@ void report_stage(const Workbench& bench, const RenderedViews& views, std::span<
       page.loss.push_back(loss.is_number() ? loss.get<float>() : NAN);
   const std::vector<OtherLight> lights = other_lights(bench);
   page.relit = relit_pictures(bench, lights, run);
-  page.masks = mask_pictures(bench);
-  page.strength = bench.strength.views;
+  page.masks = mask_pictures(bench, strength);
+  page.strength = strength.views;
   page.viewer = viewer(bench, fitted, lights, record.metrics.at("relight"), views.set.exposure_ev);
   page.config = asked_for(run);
   page.metrics = gather_metrics(run, record.metrics);

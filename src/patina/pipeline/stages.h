@@ -24,11 +24,22 @@ struct RenderedViews {
   std::vector<Image> normal;  // [H,W,3] in the protocol of ControlNet normalbae
 };
 
+/// Where and how strongly the surface may change (asset/strength_map.h). Maps and views are empty without
+/// masks: fully, on all of the materials that may change.
+struct Strength {
+  std::vector<bool> enhanced;    // one a material of the asset: may any of its texels change
+  std::vector<asset::Map> maps;  // one a material
+  std::vector<Image> views;      // one a camera, [H,W,1] (views/strength_views.h)
+};
+
+/// The strength of a run without masks.
+Strength unmasked(const Workbench& bench);
+
 /// Combines the masks into strengths → masks/NN_<material>_strength.png, one grey picture a material that has
-/// some, and sets bench.strength and, where a material keeps every texel, bench.enhanced. Does nothing
-/// without masks. Throws Error for materials that the asset does not have, pictures that are no masks, and
-/// masks that leave nothing to change or nothing that a camera sees.
-void mask_stage(Workbench& bench, const MaskSettings& settings, RunFolder& run, const RunProgress& progress);
+/// some. Without masks it writes nothing. Throws Error for materials that the asset does not have, pictures
+/// that are no masks, and masks that leave nothing to change or nothing that a camera sees.
+Strength mask_stage(const Workbench& bench, const MaskSettings& settings, RunFolder& run,
+                    const RunProgress& progress);
 
 /// Renders the views → views/tile_NN.png, views/normal_NN.png, views/radiance_NN.exr, views/cameras.json.
 RenderedViews render_stage(const Workbench& bench, const RenderSettings& settings, RunFolder& run,
@@ -41,12 +52,13 @@ struct PreparedEdit {
   nlohmann::json noise_metrics;
   double noise_seconds = 0, correspond_seconds = 0;
 };
-PreparedEdit prepare_edit(const Workbench& bench, const RenderedViews& views, const EditSettings& settings,
-                          const diffusion::Model& model, const RunProgress& progress);
+PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                          const EditSettings& settings, const diffusion::Model& model,
+                          const RunProgress& progress);
 
 /// Lets the diffusion model edit the views → detail/edited_NN.png; with masks also their strengths there,
 /// detail/strength_NN.png. Loads the model where it is needed.
-std::vector<Image> edit_stage(const Workbench& bench, const RenderedViews& views,
+std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
                               const EditSettings& settings, ResolvedModel& model, RunFolder& run,
                               const RunProgress& progress);
 
@@ -58,14 +70,15 @@ struct FittedMaterials {
   std::vector<asset::MaterialMaps> maps;  // one a material of the asset
   std::vector<asset::MapSet> changed;
 };
-FittedMaterials fit_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                          const FitSettings& settings, RunFolder& run, const RunProgress& progress);
+FittedMaterials fit_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                          std::span<const Image> edited, const FitSettings& settings, RunFolder& run,
+                          const RunProgress& progress);
 
 /// Measures the result and shows it → metrics.json, report.html, turntable.webp, report/rendered_NN.png. The
 /// page also shows what config.json of the run folder says.
-void report_stage(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
-                  const FittedMaterials& fitted, const ReportSettings& settings, RunFolder& run,
-                  const RunProgress& progress);
+void report_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
+                  std::span<const Image> edited, const FittedMaterials& fitted,
+                  const ReportSettings& settings, RunFolder& run, const RunProgress& progress);
 
 /// What lies in the run folder from earlier, without running anything. Throw Error{kNotFound} that says which
 /// command makes it.

@@ -170,7 +170,7 @@ Workbench open_workbench(const InputSettings& inputs, const Progress& progress) 
   bench.asset = asset::read_asset(inputs.asset);
   asset::require_enhanceable(bench.asset);
   bench.warnings = bench.asset.warnings;
-  bench.enhanced = choose_materials(bench.asset, inputs.materials, bench.warnings);
+  bench.chosen = choose_materials(bench.asset, inputs.materials, bench.warnings);
   bench.maps = asset::resolve_materials(bench.asset);
 
   std::vector<asset::MaterialMaps> context_maps;

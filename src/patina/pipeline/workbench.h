@@ -18,18 +18,11 @@
 
 namespace patina::pipeline {
 
-/// How strongly the surface may change (asset/strength_map.h); empty without masks: fully, everywhere.
-struct Strength {
-  std::vector<asset::Map> maps;  // one a material of the asset
-  std::vector<Image> views;      // one a camera, [H,W,1] (views/strength_views.h)
-};
-
 struct Workbench {
   asset::Asset asset;
   std::unique_ptr<asset::Asset> context;  // null: none
   std::vector<asset::MaterialMaps> maps;  // the asset's own, one a material
-  std::vector<bool> enhanced;             // one a material: may it change
-  Strength strength;                      // set by mask_stage
+  std::vector<bool> chosen;               // one a material: may it change, masks aside
   std::unique_ptr<render::Scene> scene;   // with `maps`
   std::vector<render::Camera> cameras;
   std::vector<std::string> warnings;  // what will not come out well, for the report
