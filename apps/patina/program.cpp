@@ -1,8 +1,58 @@
 #include "program.h"
 
+#include <cstdio>
+#include <new>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
 #include "commands.h"
+#include "console.h"
+#include "patina/base/error.h"
+#include "usage.h"
 
 namespace patina::app {
+namespace {
+
+// "patina: " and the message, on standard error, or an event. The message is free of control characters.
+int fail(int exit_code, const char* kind, const std::string& context, const std::string& message,
+         bool as_event) {
+  if (as_event) {
+    write_event({{"event", "error"},
+                 {"kind", kind},
+                 {"about", context},
+                 {"text", message},
+                 {"exit_code", exit_code}});
+  } else {
+    const std::string line = "patina: " + (context.empty() ? "" : context + ": ") + message + "\n";
+    (void)std::fwrite(line.data(), 1, line.size(), stderr);
+  }
+  return exit_code;
+}
+
+// Whether failures are told as events, known before the command line was understood.
+bool asks_for_events(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument == "--progress=json") return true;
+    if (argument == "--progress" && i + 1 < argc && std::string_view(argv[i + 1]) == "json") return true;
+  }
+  return false;
+}
+
+int exit_code_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kUsage:
+      return 2;
+    case ErrorCode::kInterrupted:
+      return 130;
+    default:
+      return 1;
+  }
+}
+
+}  // namespace
 
 std::unique_ptr<CLI::App> make_program() {
   auto program = std::make_unique<CLI::App>(
@@ -22,6 +72,37 @@ std::unique_ptr<CLI::App> make_program() {
   add_info(*program);
   add_models(*program);
   return program;
+}
+
+int run_program(int argc, char** argv) {
+  const std::unique_ptr<CLI::App> program = make_program();
+  const bool as_event = asks_for_events(argc, argv);
+  const auto fault = [&](const char* what, const char* hint) {
+    return fail(1, "fault", "", printable(what, 2000) + hint, as_event);
+  };
+  try {
+    program->parse(argc, argv);
+    if (std::fflush(stdout) != 0) return fail(1, "io", "", "standard output cannot be written", as_event);
+    return 0;
+  } catch (const CLI::Success& e) {  // --help, --version
+    return program->exit(e);
+  } catch (const CLI::ParseError& e) {
+    const std::string text = about_unexpected(*program, argc, argv, e.what());
+    return fail(2, "usage", "", printable(text, 2000) + "\nTry `patina --help` or `patina COMMAND --help`.",
+                as_event);
+  } catch (const Error& e) {
+    const std::string context = context_at_command_line(e, chosen_command(*program));
+    return fail(exit_code_of(e.code()), name_of(e.code()), printable(context, 500),
+                printable(e.message(), 2000), as_event);
+  } catch (const std::bad_alloc&) {
+    return fault("out of memory",
+                 "; use fewer or smaller views (--views 4, --resolution 256) or smaller textures "
+                 "(--texture-size 1024)");
+  } catch (const std::exception& e) {
+    return fault(
+        e.what(),
+        "\nThis is a fault of patina; please report it with the command and, if you can, the files.");
+  }
 }
 
 }  // namespace patina::app

@@ -10,4 +10,8 @@ namespace patina::app {
 /// Parsing a command line runs the subcommand that it names.
 std::unique_ptr<CLI::App> make_program();
 
+/// Runs a command line as main() gets it. What went wrong is told on standard error. Returns the exit code: 0
+/// done, 1 failed, 2 wrong usage, 130 stopped by the user.
+int run_program(int argc, char** argv);
+
 }  // namespace patina::app

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <CLI/CLI.hpp>
 
+#include "in_process.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/pipeline/options.h"
@@ -17,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-ProcessResult patina(std::vector<std::string> arguments) {
+ProcessResult as_process(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), built_program("patina").string());
   return run_process(arguments, {.seconds = 120});
 }
@@ -65,7 +66,7 @@ TEST(CommandLine, help_explains_every_option) {
 }
 
 TEST(CommandLine, help_and_version_go_to_standard_output) {
-  const ProcessResult help = patina({"report", "--help"}), version = patina({"--version"});
+  const ProcessResult help = as_process({"report", "--help"}), version = as_process({"--version"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_NE(help.output.find("--turntable"), std::string::npos) << help.output;
   EXPECT_EQ(version.exit_code, 0);
@@ -73,7 +74,7 @@ TEST(CommandLine, help_and_version_go_to_standard_output) {
 }
 
 TEST(CommandLine, wrong_usage_is_exit_code_2) {
-  EXPECT_EQ(patina({}).exit_code, 2);
+  EXPECT_EQ(as_process({}).exit_code, 2);
   EXPECT_EQ(patina({"polish", "a.glb"}).exit_code, 2);
   EXPECT_EQ(patina({"enhance"}).exit_code, 2);
   EXPECT_EQ(patina({"enhance", kettle(), "--colour", "red"}).exit_code, 2);
@@ -214,7 +215,7 @@ TEST(CommandLine, a_comparison_wants_two_finished_runs_and_nothing_to_run) {
 
 TEST(CommandLine, stages_say_what_comes_first) {
   const TemporaryFolder folder;
-  const ProcessResult result = patina({"detail", folder.path().string()});
+  const ProcessResult result = as_process({"detail", folder.path().string()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.error.find("patina render"), std::string::npos) << result.error;
 }

@@ -8,6 +8,7 @@
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
 #include "process.h"
+#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::test {
@@ -15,15 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path kettle() {
-  return data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
-}
-
 // Small, but every part real: four views, two evaluations with guidance and bias, a short fit.
 std::vector<std::string> enhance_command(const fs::path& output) {
   return {built_program("patina").string(),
           "enhance",
-          kettle().string(),
+          small_kettle().string(),
           "-p",
           "a rusty old kettle",
           "-n",
@@ -63,7 +60,7 @@ TEST(Enhance, writes_asset_report_and_metrics) {
   const fs::path output = folder.path() / "out.glb", run = folder.path() / "out.patina-run";
   run_ok(enhance_command(fs::relative(output)));  // as a user gives it: relative to where they stand
 
-  const asset::Asset before = asset::read_asset(kettle()), after = asset::read_asset(output);
+  const asset::Asset before = asset::read_asset(small_kettle()), after = asset::read_asset(output);
   ASSERT_EQ(after.primitives.size(), before.primitives.size());
   for (size_t i = 0; i < after.primitives.size(); ++i) {
     EXPECT_EQ(after.primitives[i].p_world, before.primitives[i].p_world);

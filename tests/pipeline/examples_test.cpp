@@ -1,12 +1,14 @@
 // Every command line that README, docs and help texts show is understood by the program.
+#include <wordexp.h>
+
 #include <regex>
 #include <sstream>
 
 #include <gtest/gtest.h>
 
+#include "in_process.h"
 #include "patina/base/files.h"
 #include "patina/pipeline/options.h"
-#include "process.h"
 #include "support.h"
 
 namespace patina::test {
@@ -45,11 +47,18 @@ std::vector<Example> examples_of(const fs::path& page) {
 // What the program says of a command line where no file exists: 1, since it looks for the files once it has
 // understood the rest.
 ProcessResult tried(const std::string& command) {
+  wordexp_t words{};
+  const int refused = ::wordexp(command.c_str(), &words, WRDE_NOCMD);  // as a shell takes it apart
+  EXPECT_EQ(refused, 0) << command;
+  std::vector<std::string> arguments;
+  if (refused == 0) arguments.assign(words.we_wordv, words.we_wordv + words.we_wordc);
+  if (refused == 0) ::wordfree(&words);
   const TemporaryFolder empty;
-  return run_process(
-      {"/bin/sh", "-c",
-       "cd '" + empty.path().string() + "' && '" + built_program("patina").string() + "' " + command},
-      {.seconds = 60});
+  const fs::path here = fs::current_path();
+  fs::current_path(empty.path());
+  const ProcessResult result = patina(arguments);
+  fs::current_path(here);
+  return result;
 }
 
 TEST(Examples, of_readme_and_docs_are_understood) {

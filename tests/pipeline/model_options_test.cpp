@@ -1,9 +1,9 @@
 // Telling patina of models: the options that name their parts, and the commands that look at them.
 #include <gtest/gtest.h>
 
+#include "in_process.h"
 #include "patina/base/error.h"
 #include "patina/pipeline/options.h"
-#include "process.h"
 #include "support.h"
 
 namespace patina::pipeline {
@@ -43,26 +43,21 @@ TEST(ModelOptions, survive_a_round_trip_through_json) {
   EXPECT_EQ(again.edit.options.clip_skip, 2);
 }
 
-test::ProcessResult patina(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), test::built_program("patina").string());
-  return test::run_process(arguments, {.seconds = 120});
-}
-
 TEST(ModelCommands, models_lists_a_folder) {
-  const test::ProcessResult result = patina({"models", test::data_dir().string()});
+  const test::ProcessResult result = test::patina({"models", test::data_dir().string()});
   EXPECT_EQ(result.exit_code, 0) << result.error;
   EXPECT_NE(result.output.find("diffusers model  Stable Diffusion 1.x  f32"), std::string::npos)
       << result.output;
   EXPECT_NE(result.output.find("tiny-sd"), std::string::npos);
-  EXPECT_EQ(patina({"models", "/no/such/folder"}).exit_code, 1);
+  EXPECT_EQ(test::patina({"models", "/no/such/folder"}).exit_code, 1);
 }
 
 TEST(ModelCommands, model_check_says_what_it_is_or_what_is_wrong) {
-  const test::ProcessResult good = patina({"model", "check", (test::data_dir() / "tiny-sd").string()});
+  const test::ProcessResult good = test::patina({"model", "check", (test::data_dir() / "tiny-sd").string()});
   EXPECT_EQ(good.exit_code, 0) << good.error;
   EXPECT_NE(good.output.find("686 tensors"), std::string::npos) << good.output;
   const test::ProcessResult bad =
-      patina({"model", "check", (test::data_dir() / "tiny-sd/model_index.json").string()});
+      test::patina({"model", "check", (test::data_dir() / "tiny-sd/model_index.json").string()});
   EXPECT_EQ(bad.exit_code, 1);
   EXPECT_NE(bad.error.find("model_index.json"), std::string::npos) << bad.error;
 }

@@ -5,6 +5,7 @@
 
 #include "patina/base/error.h"
 #include "patina/pipeline/workbench.h"
+#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::pipeline {
@@ -25,7 +26,7 @@ struct Kettle {
   }
   static Workbench open(int num_views) {
     Config config;
-    config.inputs.asset = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+    config.inputs.asset = test::small_kettle();
     config.inputs.orbit.num_views = num_views;
     config.inputs.orbit.resolution = 128;
     return open_workbench(config.inputs, {});

@@ -8,8 +8,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "in_process.h"
 #include "patina/base/files.h"
 #include "process.h"
+#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::test {
@@ -25,7 +27,7 @@ fs::path repository() {
 std::vector<std::string> enhance_command(const fs::path& output) {
   return {built_program("patina").string(),
           "enhance",
-          (repository() / "examples/kettle.glb").string(),
+          small_kettle().string(),
           "-p",
           "a rusty old kettle",
           "-m",
@@ -136,9 +138,8 @@ TEST(Progress, json_tells_stages_progress_previews_warnings_and_the_result) {
 
 TEST(Progress, json_tells_failures_of_usage_and_of_files) {
   const auto last_event = [](std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), built_program("patina").string());
     arguments.insert(arguments.end(), {"--progress", "json"});
-    const ProcessResult result = run_process(arguments, {.seconds = 60});
+    const ProcessResult result = patina(arguments);
     const std::vector<json> events = events_of(result.error);
     expect_documented(events);
     EXPECT_FALSE(events.empty());

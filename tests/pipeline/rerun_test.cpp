@@ -15,6 +15,7 @@
 #include "patina/image/image_io.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/options.h"
+#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::pipeline {
@@ -59,7 +60,7 @@ class Rerun : public testing::Test {
     const fs::path tiny = test::data_dir() / "tiny-sd";
     fs::copy(tiny, file("model"), fs::copy_options::recursive);
     fs::create_directories(file("model-dir"));
-    fs::copy(example(), file("context.glb"));
+    fs::copy(test::small_kettle(), file("context.glb"));
     Image sky(8, 4, 3);
     for (size_t i = 0; i < sky.pixels.size(); ++i) sky.pixels[i] = 0.25f * static_cast<float>(i % 7);
     write_image(file("sky.exr"), sky);
@@ -83,13 +84,10 @@ class Rerun : public testing::Test {
   }
   static void TearDownTestSuite() { delete folder_; }
 
-  static fs::path example() {
-    return test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
-  }
   static fs::path kettle() { return file("kettle.glb"); }
   // The example with vertex colours: its normals, taken as such.
   static void write_colored_kettle(const fs::path& path) {
-    const std::vector<uint8_t> bytes = read_file(example());
+    const std::vector<uint8_t> bytes = read_file(test::small_kettle());
     uint32_t length = 0;
     std::memcpy(&length, bytes.data() + 12, sizeof length);
     json gltf = json::parse(bytes.begin() + 20, bytes.begin() + 20 + length);

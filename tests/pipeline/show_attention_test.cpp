@@ -7,10 +7,12 @@
 
 #include <gtest/gtest.h>
 
+#include "in_process.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/image/image_io.h"
 #include "process.h"
+#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::pipeline {
@@ -21,7 +23,7 @@ using test::TemporaryFolder;
 
 Config small_config(const fs::path& run) {
   Config config;
-  config.inputs.asset = test::data_dir().parent_path().parent_path() / "examples" / "kettle.glb";
+  config.inputs.asset = test::small_kettle();
   config.run = run;
   config.edit.model.model = test::data_dir() / "tiny-sd";
   config.edit.options.prompt = "a rusty old kettle";
@@ -158,15 +160,14 @@ TEST(ShowAttention, runs_from_the_command_line) {
   EXPECT_TRUE(fs::exists(folder.path() / "attention.patina-run" / "views" / "tile_00.png"));
 
   const test::ProcessResult listed =
-      test::run_process({command[0], "show-attention", command[2], "--layer", "list", "-m",
-                         config.edit.model.model.string(), "--views", "4", "--resolution", "64"},
-                        {.seconds = 120});
+      test::patina({"show-attention", command[2], "--layer", "list", "-m", config.edit.model.model.string(),
+                    "--views", "4", "--resolution", "64"});
   EXPECT_EQ(listed.exit_code, 0) << listed.error;
   EXPECT_NE(listed.output.find("mid_block.attentions.0 "), std::string::npos) << listed.output;
   EXPECT_NE(listed.output.find("16 × 16 latent pixels"), std::string::npos) << listed.output;
 
   command.insert(command.end(), {"--pixel", "12"});
-  const test::ProcessResult refused = test::run_process(command, {.seconds = 120});
+  const test::ProcessResult refused = test::patina({command.begin() + 1, command.end()});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_NE(refused.error.find("--pixel: expected two whole numbers"), std::string::npos) << refused.error;
 }
