@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs test programs of a build folder and ends with one line: N passed, N failed, N skipped.
+# Runs test programs of a build folder, two at a time, and ends with one line: N passed, N failed, N skipped.
 #   scripts/run_tests.sh build/release                 # all
 #   scripts/run_tests.sh build/asan-ubsan base asset   # some
 set -u
@@ -8,13 +8,11 @@ shift
 cd "$(dirname "$0")/.."
 
 export OMP_WAIT_POLICY=passive   # OpenMP's waiting threads sleep; spinning ones starve the tests beside them
-passed=0 failed=0 skipped=0
-suites=("$@")
-if ((${#suites[@]} == 0)); then mapfile -t suites < "$build/tests.txt"; fi
-for suite in "${suites[@]}"; do
-  name="test_$suite"
-  log="$build/$name.log"
-  start=$SECONDS
+at_a_time=2                      # while one loads files or starts programs the other computes
+
+# Runs one suite; leaves what is to be said of it in its .summary and its three counts in its .counts.
+run_suite() {
+  local name="test_$1" log="$build/test_$1.log" start=$SECONDS status p f s
   "$build/$name" --gtest_color=no >"$log" 2>&1
   status=$?
   p=$(grep -c '^\[       OK \]' "$log")
@@ -22,10 +20,29 @@ for suite in "${suites[@]}"; do
   s=$(grep -c '^\[  SKIPPED \].* ms)$' "$log")
   # A program that is missing, or crashed before it could count its failure, is a failure too.
   if ((status != 0 && f == 0)); then f=1; fi
+  {
+    printf '%-20s %4d passed %3d failed %3d skipped  %4d s\n' "$name" "$p" "$f" "$s" $((SECONDS - start))
+    if ((f > 0)); then tail -n 60 "$log"; fi
+    if ((s > 0)); then grep -A1 -E 'Skipped$' "$log" | grep -v -E 'Skipped$|^--' | sort | uniq -c | head -5; fi
+  } >"$build/$name.summary"
+  cat "$build/$name.summary"
+  echo "$p $f $s" >"$build/$name.counts"
+}
+
+suites=("$@")
+# From the last: folders that stand on many others take longest.
+if ((${#suites[@]} == 0)); then mapfile -t suites < <(tac "$build/tests.txt"); fi
+for suite in "${suites[@]}"; do
+  rm -f "$build/test_$suite.counts"
+  while (($(jobs -rp | wc -l) >= at_a_time)); do wait -n; done
+  run_suite "$suite" &
+done
+wait
+
+passed=0 failed=0 skipped=0
+for suite in "${suites[@]}"; do
+  read -r p f s <"$build/test_$suite.counts" || p=0 f=1 s=0
   passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
-  printf '%-20s %4d passed %3d failed %3d skipped  %4d s\n' "$name" "$p" "$f" "$s" $((SECONDS - start))
-  if ((f > 0)); then tail -n 60 "$log"; fi
-  if ((s > 0)); then grep -A1 -E 'Skipped$' "$log" | grep -v -E 'Skipped$|^--' | sort | uniq -c | head -5; fi
 done
 echo "$passed passed, $failed failed, $skipped skipped"
 ((failed == 0 && passed > 0))
