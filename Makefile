@@ -54,9 +54,9 @@ blender-extension:
 	@blender/package.py build/blender/patina_enhance.zip
 	@echo "The extension:  $(CURDIR)/build/blender/patina_enhance.zip"
 
-SANITISED := base image asset views correspond attention
+SANITISED := base image asset views masks correspond attention
 sanitise: setup
-	@cmake --preset asan-ubsan -DPATINA_PCH=OFF
+	@cmake --preset asan-ubsan
 	@cmake --build build/asan-ubsan --parallel $(JOBS) --target $(addprefix test_,$(SANITISED))
 	@scripts/run_tests.sh build/asan-ubsan $(SANITISED)
 
