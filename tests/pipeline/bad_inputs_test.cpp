@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "bad_inputs.h"
+#include "in_process.h"
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/base/memory.h"
@@ -118,8 +119,7 @@ TEST(BadInputs, the_program_refuses_in_one_line_with_exit_code_1) {
   for (const BadInput& c : read_bad_inputs(data_dir() / "bad-inputs")) {
     if (c.expect != "reject" || !kinds.insert(c.kind).second) continue;  // one of each kind
     SCOPED_TRACE(c.path);
-    const ProcessResult result =
-        run_process({built_program("patina").string(), "info", c.path.string()}, {.seconds = kMaxSeconds});
+    const ProcessResult result = patina({"info", c.path.string()});
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_EQ(result.output, "");
     EXPECT_TRUE(result.error.starts_with("patina: ")) << result.error;
