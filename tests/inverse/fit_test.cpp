@@ -529,12 +529,13 @@ TEST(fit, texels_without_strength_keep_their_values_in_every_map) {
       const asset::Map& now = slot_map(result.maps[0], row.slot);
       const Image old = at_size_of(now.texels, slot_map(before[0], row.slot), row.encoding);
       const auto channels = static_cast<size_t>(old.channels);
+      // Resampled normals were normalised by other code than the test's, which may round otherwise.
+      const float rounding = size > 0 && row.encoding == asset::MapEncoding::kNormal ? 3e-7f : 0.0f;
       size_t changed = 0;
       for (size_t i = 0; i < old.num_pixels(); ++i) {
-        // Resampled normals were normalised by other code than the test's, which may round otherwise.
         const bool same = std::equal(&old.pixels[i * channels], &old.pixels[i * channels] + channels,
                                      &now.texels.pixels[i * channels],
-                                     [](float a, float b) { return std::abs(a - b) <= 3e-7f; });
+                                     [&](float a, float b) { return std::abs(a - b) <= rounding; });
         const bool masked = 2 * (static_cast<int>(i) % old.width) < old.width;
         if (masked) {
           EXPECT_TRUE(same) << row.name << " texel " << i;
