@@ -7,8 +7,10 @@ build="${1:?usage: scripts/run_tests.sh BUILD_DIR [SUITE ...]}"
 shift
 cd "$(dirname "$0")/.."
 
-export OMP_WAIT_POLICY=passive   # OpenMP's waiting threads sleep; spinning ones starve the tests beside them
-at_a_time=2                      # while one loads files or starts programs the other computes
+# OpenMP's threads wait for one another many times a network's layer, and on a busy machine each wait is long: two
+# suites with a thread each end sooner than with more. They sleep, since spinning ones starve the tests beside them.
+export OMP_WAIT_POLICY=passive OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
+at_a_time=2   # while one loads files or starts programs the other computes
 
 # Runs one suite; leaves what is to be said of it in its .summary and its three counts in its .counts.
 run_suite() {

@@ -122,9 +122,9 @@ TEST(Detail, stops_between_steps_when_asked_and_reports_every_step) {
 }
 
 TEST(Detail, a_bias_of_zero_is_none_and_another_is_felt) {
-  EditInputs inputs = made_inputs(2, 128);
+  EditInputs inputs = made_inputs(2, 64);
   const std::vector<Image> plain = run(inputs, short_options());
-  inputs.bias_levels = same_place_bias(2, 16, 2);
+  inputs.bias_levels = same_place_bias(2, 8, 2);
   EditOptions options = short_options();
   EXPECT_EQ(run(inputs, options)[0].pixels, plain[0].pixels);
   options.bias_weight = 4;
@@ -135,8 +135,8 @@ TEST(Detail, a_bias_of_zero_is_none_and_another_is_felt) {
 }
 
 TEST(Detail, the_bias_of_controlnets_is_felt_only_where_it_is_asked_for) {
-  EditInputs inputs = made_inputs(2, 128);
-  inputs.bias_levels = same_place_bias(2, 16, 2);
+  EditInputs inputs = made_inputs(2, 64);
+  inputs.bias_levels = same_place_bias(2, 8, 2);
   EditOptions options = short_options();
   options.num_steps = 2, options.strength = 1;
   const std::vector<Image> plain = run(inputs, options);
@@ -297,7 +297,7 @@ TEST(Detail, predicted_memory_follows_views_guidance_and_what_stays_in_memory) {
 
 TEST(Detail, bf16_stays_near_f32) {
   const Model model(find_model_parts({test::data_dir() / "tiny-sd", {}, {}, {}}), {Dtype::kBf16});
-  const EditInputs inputs = made_inputs(1, 128);
+  const EditInputs inputs = made_inputs(1, 64);
   EditOptions options = short_options();
   options.num_steps = 20, options.strength = 1;
   for (const float guidance_scale : {1.0f, 7.5f}) {

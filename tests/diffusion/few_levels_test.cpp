@@ -52,16 +52,16 @@ class ThreeLevels : public testing::Test {
 
 TEST_F(ThreeLevels, take_the_levels_that_fit_and_leave_the_coarser_ones) {
   const Model model(find_model_parts({path(), {}, {}, {}}), {Dtype::kF32});
-  EditInputs inputs = made_inputs(2, 128);
+  EditInputs inputs = made_inputs(2, 64);
   EditOptions options = short_options();
   options.num_steps = 2, options.strength = 1;
   const Image plain = edit_views(model, inputs, options, {}, {})[0];
 
   options.bias_weight = 3;
-  inputs.bias_levels = same_place_bias(2, 16, 3);
+  inputs.bias_levels = same_place_bias(2, 8, 3);
   const Image three = edit_views(model, inputs, options, {}, {})[0];
   EXPECT_GT(max_difference(three, plain), 1e-3);
-  inputs.bias_levels = same_place_bias(2, 16, 4);
+  inputs.bias_levels = same_place_bias(2, 8, 4);
   EXPECT_EQ(edit_views(model, inputs, options, {}, {})[0].pixels, three.pixels);
 }
 
