@@ -44,7 +44,7 @@ def prepare():
     settings.prompt, settings.strength = "a rusty old kettle", 0.9
     settings.preset = "fast"
     options = folder / "options.toml"
-    options.write_text("steps = 10\nfit-iterations = 50\nsamples = 16\n")
+    options.write_text("steps = 10\nfit-iterations = 12\nsamples = 16\n")
     settings.config = str(options)
     window, area, region = viewport()
     with bpy.context.temp_override(window=window, area=area, region=region):

@@ -17,7 +17,7 @@ shared="${PATINA_SHARED:-../shared}"
 # Small enough for three minutes a program on two cores, and every part is real: control images, noise,
 # correspondences, guidance, the bias, and a fit with several light caches.
 options=(--prompt "rusty old metal" --strength 0.5 --steps 8 --views 4 --resolution 128 --samples 16
-         --max-depth 4 --fit-iterations 40 --texture-size 256 --fit base_color,roughness,normal,metallic
+         --max-depth 4 --fit-iterations 12 --texture-size 256 --fit base_color,roughness,normal,metallic
          --turntable 0 --dtype f32 --seed 7 --model models/patina-mini --quiet)
 assets=(examples/kettle.glb "$shared/assets/WaterBottle/WaterBottle.gltf" "$shared/assets/Spot/spot_triangulated.obj")
 

@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 using asset::Map;
 using asset::MaterialMaps;
 
-constexpr int kTextureSize = 512;  // of the aged maps
+constexpr int kTextureSize = 512;        // of the aged maps
+constexpr int kRelightingSamples = 256;  // a pixel, at least: noise would count as error
 constexpr const char* kRelightings[] = {"st_fagans_interior_1k.hdr", "kiara_1_dawn_1k.hdr",
                                         "studio_small_03_1k.hdr"};
 
@@ -152,11 +153,13 @@ std::vector<Image> relit_views(const Aged& aged, const AgedOptions& options, con
                                const std::vector<MaterialMaps>& maps) {
   const render::Scene scene(aged.asset, maps,
                             render::read_environment(options.shared / "assets/hdri" / environment));
+  render::PathOptions path = path_options(options);
+  path.samples_per_pixel = std::max(path.samples_per_pixel, kRelightingSamples);
   std::vector<Image> pictures;
   for (size_t v = 0; v < aged.views.views.size(); v += 3) {
     render::Camera camera = aged.views.views[v].camera;
     camera.width = camera.height = std::max(32, options.resolution / 2);
-    pictures.push_back(render::render(scene, camera, path_options(options)).radiance);
+    pictures.push_back(render::render(scene, camera, path).radiance);
   }
   return pictures;
 }
@@ -208,14 +211,22 @@ Aged age_and_fit(const Ageing& ageing, const AgedOptions& options) {
   orbit.resolution = options.resolution;
   views::ViewOptions view_options;
   view_options.path = path_options(options);
-  const render::Scene truth(aged.asset, aged.truth, render::studio_environment());
-  aged.views = views::render_views(truth, views::orbit_cameras(aged.asset, orbit), view_options, {});
-  for (const views::View& view : aged.views.views)
-    aged.targets.push_back(tone_map(view.radiance, aged.views.exposure_ev));
+  const render::Scene start(aged.asset, aged.start, render::studio_environment()),
+      truth(aged.asset, aged.truth, render::studio_environment());
+  const std::vector<render::Camera> cameras = views::orbit_cameras(aged.asset, orbit);
+  aged.views = views::render_views(start, cameras, view_options, {});
+  view_options.exposure_ev = aged.views.exposure_ev;
+  const auto pictures_of = [&](const views::ViewSet& set) {
+    std::vector<Image> pictures;
+    for (const views::View& view : set.views) pictures.push_back(tone_map(view.radiance, set.exposure_ev));
+    return pictures;
+  };
+  aged.clean = pictures_of(aged.views);
+  aged.targets = pictures_of(views::render_views(truth, cameras, view_options, {}));
 
   const auto begin = std::chrono::steady_clock::now();
-  const render::Scene start(aged.asset, aged.start, render::studio_environment());
-  aged.fit = inverse::fit_materials(start, {aged.views, aged.targets}, options.fit, {}, {});
+  aged.fit = inverse::fit_materials(start, {.views = aged.views, .edited = aged.targets, .clean = aged.clean},
+                                    options.fit, {}, {});
   aged.fit_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return aged;
 }

@@ -39,8 +39,8 @@ struct Aged {
   const Ageing* ageing = nullptr;
   asset::Asset asset;
   std::vector<asset::MaterialMaps> start, truth;
-  views::ViewSet views;        // of the truth
-  std::vector<Image> targets;  // sRGB
+  views::ViewSet views;               // of the start
+  std::vector<Image> clean, targets;  // start and truth, sRGB
   inverse::FitResult fit;
   double fit_seconds = 0;
 };

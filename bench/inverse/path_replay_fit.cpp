@@ -43,8 +43,9 @@ double path_replay_iteration_seconds(const test::Recovery& recovery, const inver
           radiance +=
               inverse::path_radiance(records.back(), maps, scene.bsdf_model()) / static_cast<float>(paths);
         }
-        const vec3 d_radiance = pixel.weight / static_cast<float>(paths) *
-                                inverse::relative_l2(radiance, radiance, pixel.target, gain).d_radiance;
+        const inverse::PixelResidual residual = inverse::relative_residual(radiance, pixel.target, gain);
+        const vec3 d_radiance =
+            2.0f * pixel.weight / static_cast<float>(paths) * residual.value * residual.d_radiance;
         for (const inverse::PathRecord& record : records)
           inverse::add_path_gradient(record, maps, scene.bsdf_model(), d_radiance,
                                      gradients[static_cast<size_t>(part)]);

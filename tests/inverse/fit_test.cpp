@@ -48,7 +48,7 @@ Task make_task(
 }
 inverse::FitOptions quick() {
   inverse::FitOptions options;
-  options.iterations = 24;
+  options.iterations = 12;
   options.light_samples = 16;
   options.max_depth = 2;
   return options;
@@ -85,11 +85,15 @@ struct Found {
   inverse::FitResult result;
   double before, after;
 };
-constexpr int kEnoughIterations = 80;
+constexpr int kEnoughIterations = 24;
+// One view cannot tell a dark dielectric from a metal.
+const asset::MapSet kMapsOfOneView =
+    asset::set_of({asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal});
 Found find_textures(Task& task) {
   const auto start = task.world.scene.materials();
   inverse::FitOptions options = quick();
   options.iterations = kEnoughIterations;
+  options.maps = kMapsOfOneView;
   auto result = inverse::fit_materials(task.world.scene, {task.views, task.edited}, options, {}, {});
   const double before = base_color_error(start, task, result),
                after = base_color_error(result.maps, task, result);
@@ -99,7 +103,9 @@ Found find_textures(Task& task) {
 TEST(fit, finds_base_colour_from_one_view) {
   Task task = make_task(64);
   const auto [result, before, after] = find_textures(task);
-  EXPECT_LT(after, 0.5 * before) << before << " -> " << after;
+  // Colour and roughness of these textures have nothing to do with each other, so what the fit knows of kinds
+  // of material misleads it.
+  EXPECT_LT(after, 0.65 * before) << before << " -> " << after;
   EXPECT_GT(result.psnr, 25.0f);
 
   // The maps that were written look, path-traced, as the fit believed: what it shades is what it returns.
@@ -116,10 +122,9 @@ TEST(fit, finds_base_colour_from_one_view) {
       const vec3 d = rendered.rgb(x, y) - task.edited[0].rgb(x, y);
       error += glm::dot(d, d) / 3.0f, count += 1;
     }
-  EXPECT_GT(-10.0 * std::log10(error / count), result.psnr - 1.0f);
+  EXPECT_GT(-10.0 * std::log10(error / count), result.psnr - 2.0f);
   ASSERT_EQ(static_cast<int>(result.loss.size()), kEnoughIterations);
-  EXPECT_TRUE(result.changed[0] == asset::set_of({asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness,
-                                                  asset::MapSlot::kNormal}));
+  EXPECT_TRUE(result.changed[0] == kMapsOfOneView);
 }
 
 TEST(fit, finds_textures_that_lie_on_the_surface_twice_each_way_or_once) {
@@ -166,7 +171,7 @@ TEST(fit, resumed_run_gives_the_same_bytes) {
       all_texels(inverse::fit_materials(whole.world.scene, {whole.views, whole.edited}, quick(), {}, {}));
 
   // Killed in the middle of a light cache's life, with the checkpoint of that iteration at hand.
-  for (const int stop_at : {7, 12}) {
+  for (const int stop_at : {3, 7}) {
     Task task = make_task();
     std::optional<inverse::FitCheckpoint> saved;
     inverse::FitHooks hooks;
@@ -200,7 +205,7 @@ TEST(fit, stopped_at_any_moment_hands_over_its_textures_and_continues_bit_for_bi
   Task counted = make_task();
   inverse::fit_materials(counted.world.scene, {counted.views, counted.edited}, quick(), {}, counting);
   const int all = num_asked;
-  for (const double share : {0.3, 0.5, 0.8}) {
+  for (const double share : {0.6, 0.75, 0.9}) {
     Task task = make_task();
     std::optional<inverse::FitCheckpoint> saved;
     std::optional<inverse::FitResult> left;
@@ -272,6 +277,31 @@ TEST(fit, changes_only_the_chosen_materials_and_maps) {
   EXPECT_EQ(result.maps[0].normal.texels.pixels, start[0].normal.texels.pixels);
   EXPECT_EQ(result.maps[1].base_color.texels.pixels, start[1].base_color.texels.pixels);
   EXPECT_FALSE(result.changed[1].any());
+}
+
+TEST(fit, a_view_that_was_not_edited_changes_hardly_anything) {
+  Task task = make_task();
+  const auto start = task.world.scene.materials();
+  render::PathOptions path;
+  path.samples_per_pixel = 8;  // noise is no edit either
+  task.edited = {tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f)};
+  const auto largest_change = [&](std::span<const Image> clean) {
+    const auto result = inverse::fit_materials(
+        task.world.scene, {.views = task.views, .edited = task.edited, .clean = clean}, quick(), {}, {});
+    float largest = 0;
+    for (size_t m = 0; m < result.maps.size(); ++m)
+      for (const asset::MapSlotRow& row : asset::kMapSlots) {
+        const asset::Map& map = asset::slot_map(result.maps[m], row.slot);
+        const Image before =
+            asset::resized(asset::slot_map(start[m], row.slot), map.texels.width, map.texels.height).texels;
+        for (size_t i = 0; i < before.pixels.size(); ++i)
+          largest = std::max(largest, std::abs(map.texels.pixels[i] - before.pixels[i]));
+      }
+    return largest;
+  };
+  const float with_clean = largest_change(task.edited), without = largest_change({});
+  EXPECT_LT(with_clean, 0.08f);
+  EXPECT_LT(with_clean, 0.25f * without);
 }
 
 TEST(fit, leaves_surface_that_no_view_saw_as_it_was) {
@@ -386,9 +416,8 @@ TEST(fit, gives_slots_without_texture_one_that_the_views_resolve) {
   options.texture_size = 48;
   Task sized = make_task();
   const auto exact = inverse::fit_materials(sized.world.scene, {sized.views, sized.edited}, options, {}, {});
-  for (const auto slot : {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal})
-    EXPECT_EQ(asset::slot_map(exact.maps[0], slot).texels.width, 48);
-  EXPECT_EQ(exact.maps[0].metallic.texels.width, 8);
+  for (const asset::MapSlotRow& row : asset::kMapSlots)
+    EXPECT_EQ(asset::slot_map(exact.maps[0], row.slot).texels.width, 48) << row.name;
 }
 
 TEST(fit, an_automatic_size_holds_what_the_views_resolve_and_never_shrinks) {
@@ -446,19 +475,30 @@ TEST(loss, derivative_agrees_with_central_differences) {
     for (const float target : {0.0f, 0.3f, 0.95f}) {
       const vec3 at(radiance, 0.5f * radiance, 2.0f * radiance), goal(target, 0.2f, 0.8f);
       const float gain = 1.7f;
-      const inverse::PixelLoss loss = inverse::relative_l2(at, at, goal, gain);
+      const inverse::PixelResidual residual = inverse::relative_residual(at, goal, gain);
       for (int c = 0; c < 3; ++c) {
         // The definition in double, its denominator held at the present value.
         const auto value = [&](double x) {
           const double mapped = gain * x / (1 + gain * x),
                        now = std::max(gain * at[c] / (1.0 + gain * at[c]), double{goal[c]});
-          return (mapped - goal[c]) * (mapped - goal[c]) / (3 * (now * now + inverse::kLossEpsilon));
+          return (mapped - goal[c]) / std::sqrt(3 * (now * now + inverse::kLossEpsilon));
         };
+        EXPECT_NEAR(residual.value[c], value(at[c]), 1e-5);
         const double h = 1e-4 * at[c];
         const double numeric = (value(at[c] + h) - value(at[c] - h)) / (2 * h);
-        EXPECT_NEAR(loss.d_radiance[c], numeric, 1e-3 * std::abs(numeric) + 1e-5);
+        EXPECT_NEAR(residual.d_radiance[c], numeric, 1e-3 * std::abs(numeric) + 1e-5);
       }
     }
+}
+
+TEST(loss, a_clipped_target_asks_for_that_much_light_or_more) {
+  const vec3 white(1.0f);
+  const inverse::PixelResidual darker = inverse::relative_residual(vec3(2.0f), white, 1.0f),
+                               brighter = inverse::relative_residual(vec3(100.0f), vec3(0.97f), 1.0f);
+  EXPECT_LT(darker.value.x, 0.0f);
+  EXPECT_GT(darker.d_radiance.x, 0.0f);
+  EXPECT_EQ(brighter.value, vec3(0.0f));
+  EXPECT_EQ(brighter.d_radiance, vec3(0.0f));
 }
 
 TEST(loss, weight_is_zero_near_silhouettes_and_falls_at_grazing_angles) {

@@ -20,6 +20,9 @@ TEST(texture_field, restriction_is_the_adjoint_of_composition) {
     map.wrap_t = asset::Wrap::kRepeat;
     inverse::TextureField field = inverse::make_field(map, 37, 20, 2);
     RandomStream random(1, RandomPurpose::kTest, 5);
+    field.kinds.texels.resize(37 * 20);
+    for (auto& shares : field.kinds.texels)
+      for (size_t k = 0; k < shares.size(); ++k) shares[k] = {static_cast<uint16_t>(3 * k), random.uniform()};
     for (Image& level : field.levels)
       for (float& value : level.pixels) value = random.uniform() - 0.5f;
     inverse::compose(field);

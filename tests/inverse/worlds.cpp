@@ -1,6 +1,9 @@
 #include "worlds.h"
 
+#include <algorithm>
+
 #include "patina/base/random.h"
+#include "patina/inverse/seen_points.h"
 
 namespace patina::test {
 namespace {
@@ -112,8 +115,16 @@ std::vector<inverse::CachePixel> all_pixels(const views::ViewSet& views) {
   std::vector<inverse::CachePixel> pixels;
   for (int y = 0; y < g.height; ++y)
     for (int x = 0; x < g.width; ++x) {
-      const int material = g.material[static_cast<size_t>(y * g.width + x)];
-      if (material == 0 || material == 1)
+      // At a silhouette the cache shows the surface alone, a render also what is beside it.
+      bool is_inside = true;
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+          const int nx = x + dx, ny = y + dy;
+          const bool is_in_image = nx >= 0 && ny >= 0 && nx < g.width && ny < g.height;
+          const int material = is_in_image ? g.material[static_cast<size_t>(ny * g.width + nx)] : -1;
+          is_inside = is_inside && (material == 0 || material == 1);
+        }
+      if (is_inside)
         pixels.push_back({0, static_cast<uint16_t>(x), static_cast<uint16_t>(y), 1.0f, vec3(0.0f)});
     }
   return pixels;
@@ -123,7 +134,9 @@ inverse::LightCache traced_cache(const World& world, const views::ViewSet& views
                                  const inverse::CacheOptions& options) {
   inverse::LightCache cache;
   cache.pixels = all_pixels(views);
-  inverse::trace_cache(cache, world.scene, world.scene.asset_materials(), world.maps, views, options, {});
+  std::vector<inverse::SeenPoint> points = inverse::trace_seen_points(world.scene, views, cache.pixels);
+  inverse::make_samples(cache, world.scene, world.maps, points);
+  inverse::trace_light(cache, world.scene, world.scene.asset_materials(), views, options, {});
   return cache;
 }
 

@@ -75,10 +75,9 @@ inline const std::vector<OptionCase> kOptionCases{
     {"bias-scaling", {"paper"}, kFromEdit},
     {"bias-controlnet", {"true"}, kFromEdit},
 
-    {"fit-iterations", {"2"}, kFromFit},
+    {"fit-iterations", {"4"}, kFromFit},
     {"texture-size", {"64"}, kFromFit},
     {"fit", {"base_color"}, kFromFit},
-    {"fit-rate", {"0.1"}, kFromFit},
     {"light-samples", {"6"}, kFromFit},
     {"boundary", {"1"}, kFromFit},
     {"unseen", {"keep"}, kFromFit},

@@ -159,13 +159,17 @@ Recovery recover(const std::filesystem::path& asset_path, const RecoveryOptions&
   for (const views::View& view : r.views.views)
     r.targets.push_back(
         moved(tone_map(view.radiance, r.views.exposure_ev), direction(r.targets.size(), options.shift)));
+  scene.set_asset_materials(r.start);
+  std::vector<Image> clean;
+  for (const render::Camera& camera : cameras)
+    clean.push_back(tone_map(render::render(scene, camera, view_options.path).radiance, r.views.exposure_ev));
   r.target_seconds = seconds_since(begin);
 
   begin = Clock::now();
-  scene.set_asset_materials(r.start);
   inverse::FitOptions fit = options.fit;
   fit.fill_unseen = false;  // what no view saw is not measured, and shows the start
-  r.fit = inverse::fit_materials(scene, {r.views, r.targets}, fit, {}, progress);
+  r.fit = inverse::fit_materials(scene, {.views = r.views, .edited = r.targets, .clean = clean}, fit, {},
+                                 progress);
   r.fit_seconds = seconds_since(begin);
   r.num_views = views_of_texels(scene, r, options.fit);
   return r;

@@ -18,6 +18,7 @@ enum class RandomPurpose : uint32_t {
   kLightCache = 5,
   kGBuffer = 7,
   kMasks = 8,
+  kMaterialKinds = 9,
   kTest = 100,
 };
 

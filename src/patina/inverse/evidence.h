@@ -5,8 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "patina/inverse/light_cache.h"
-#include "patina/inverse/material_point.h"
+#include "patina/inverse/seen_points.h"
 
 namespace patina::inverse {
 
@@ -15,15 +14,6 @@ namespace patina::inverse {
 /// shows the material or it has no UVs.
 float texels_per_pixel(const render::Scene& scene, const views::ViewSet& views,
                        std::span<const CachePixel> pixels, const asset::Map& map, int material);
-
-/// Points at which camera rays through a 2 × 2 pattern in each pixel meet a material, with the pixel's
-/// weight.
-struct SeenPoint {
-  MaterialPoint point;
-  float weight;
-};
-std::vector<SeenPoint> trace_seen_points(const render::Scene& scene, const views::ViewSet& views,
-                                         std::span<const CachePixel> pixels);
 
 /// Sum of weights with which the views see every texel of a width × height texture laid out as `map`.
 /// [height,width,1]

@@ -1,36 +1,44 @@
 #include "patina/inverse/fit.h"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "patina/base/check.h"
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/inverse/fit_result.h"
 #include "patina/inverse/fit_setup.h"
+#include "patina/inverse/fit_slots.h"
 #include "patina/inverse/fit_step.h"
 #include "patina/inverse/fit_views.h"
+#include "patina/inverse/light_schedule.h"
 #include "patina/inverse/loss.h"
+#include "patina/inverse/material_kinds.h"
 
 namespace patina::inverse {
 namespace {
 
+// Marquardt's damping after a step that made things better, and after one that did not.
+constexpr float kRelax = 3.0f, kTighten = 8.0f, kMinDamping = 1e-4f, kMaxDamping = 1e3f;
+
 constexpr double kSecondsBetweenCheckpoints = 20, kSecondsBetweenPreviews = 5;
 
 // The pixels that count, with the colours of the views as they are.
-std::vector<CachePixel> counted_pixels(const views::ViewSet& views, std::span<const Image> edited,
-                                       std::span<const Image> weights) {
+LightCache cache_of_pixels(const views::ViewSet& views, std::span<const Image> edited,
+                           std::span<const Image> weights) {
   std::vector<Image> targets;
   for (const Image& view : edited) targets.push_back(loss_target(view));
-  return select_pixels(views, targets, weights);
+  LightCache cache;
+  cache.pixels = select_pixels(views, targets, weights);
+  return cache;
 }
 
-// Radiance of every pixel in all caches but one.
-std::vector<std::span<const vec3>> all_but(const std::vector<std::vector<vec3>>& radiance, size_t left_out) {
-  std::vector<std::span<const vec3>> others;
-  for (size_t k = 0; k < radiance.size(); ++k)
-    if (k != left_out) others.push_back(radiance[k]);
-  return others;
+// Traces what the pixels show and makes `cache`'s samples of it.
+std::vector<SeenPoint> samples_of(LightCache& cache, const render::Scene& scene, const views::ViewSet& views,
+                                  std::span<const asset::MaterialMaps> base) {
+  std::vector<SeenPoint> points = trace_seen_points(scene, views, cache.pixels);
+  make_samples(cache, scene, base, points);
+  return points;
 }
 
 // Iterates to the end and calls the hooks when they are due.
@@ -62,119 +70,110 @@ Fit::Fit(const render::Scene& scene, const FitInputs& inputs, const FitOptions& 
       options_(options),
       progress_(progress),
       gain_(std::exp2(inputs.views.exposure_ev)),
-      schedule_(options.iterations),
       weights_(view_weights(scene, inputs, options)),
-      pixels_(counted_pixels(inputs.views, inputs.edited, weights_)),
-      base_(enlarged_maps(scene, inputs, pixels_, options)),
-      state_(initial_state(scene, inputs, pixels_, base_, options)),
-      untouched_(parameters_of(state_.fitted)),
+      cache_(cache_of_pixels(inputs.views, inputs.edited, weights_)),
+      base_(enlarged_maps(scene, inputs, cache_.pixels, options)),
+      seen_(samples_of(cache_, scene, inputs.views, base_)),
+      state_(initial_state(scene, inputs, cache_.pixels, seen_, base_, options)),
       coarse_(shrunk(base_, state_.fitted)),
-      evaluator_(state_.fitted, scene.bsdf_model(), gain_) {
+      evaluator_(state_.fitted, seen_, scene.bsdf_model(), gain_) {
   PATINA_CHECK_LE(0, options.iterations);
   if (state_.fitted.empty())
     progress.warn("no view shows a surface with UVs and an enhanced material: nothing was fitted");
+  seen_ = {};
 }
 
 bool Fit::has_work() const {
   return !state_.fitted.empty() && state_.next_iteration < options_.iterations;
 }
 
-void Fit::trace(LightCache& cache, int generation) {
+void Fit::trace(int generation) {
   const std::vector<asset::MaterialMaps> current = apply_changes(coarse_, state_.fitted, Padding::kNone);
   CacheOptions options;
   options.light_samples = options_.light_samples;
   options.max_depth = options_.max_depth;
   options.seed = options_.seed;
-  options.generation = static_cast<uint32_t>(generation);
-  cache.pixels = pixels_;
-  trace_cache(cache, scene_, current, base_, inputs_.views, options, progress_);
+  options.traces = kLightTraces[static_cast<size_t>(generation)].traces;
+  trace_light(cache_, scene_, current, inputs_.views, options, progress_);
 }
 
-LightCache& Fit::renew(int generation) {
-  LightCache& cache = caches_[CacheSchedule::place_of(generation)];
-  trace(cache, generation);
-  return cache;
-}
-
-void Fit::start() {
-  if (!has_work()) return;
-  for (int generation = 0; generation < CacheSchedule::kPlaces; ++generation)
-    state_.cache_radiance[CacheSchedule::place_of(generation)] = evaluator_.shade_pixels(renew(generation));
+// The first light falls on the starting maps. What it shows of them tells, beside the clean views, how far
+// off the cache is, and beside the edited ones, which texels are of one kind.
+void Fit::learn_from_start() {
+  const std::vector<vec3> clean = evaluator_.shade_samples(cache_);
+  if (!inputs_.clean.empty()) calibrate(cache_, clean, inputs_.clean, gain_);
+  for (size_t f = 0; f < state_.fitted.size(); ++f) {
+    FittedMap& map = state_.fitted[f];
+    if (!fit_slot(map.slot).follows_kinds) continue;
+    const SampleTaps& taps = evaluator_.taps_of(f);
+    map.field.kinds = MaterialKinds(cache_, clean, gain_, taps.samples).shares(taps);
+  }
 }
 
 void Fit::resume(const FitCheckpoint& checkpoint) {
+  const Parameters start = parameters_of(state_.fitted);
   restore_checkpoint(state_, checkpoint);
-  retarget(pixels_, inputs_.edited, state_.displacements);
-  if (state_.next_iteration == 0) return start();
-  if (!has_work()) return;
-  // Each cache was traced with the parameters of its own beginning.
+  if (state_.next_iteration == 0 || state_.fitted.empty()) return;
+  // The first light is that of the starting maps; the last one is what the next iteration sees.
   const Parameters current = parameters_of(state_.fitted);
-  const int newest = schedule_.newest_at(state_.next_iteration - 1);
-  for (int generation = newest - CacheSchedule::kPlaces + 1; generation <= newest; ++generation) {
-    set_parameters(state_.fitted, state_.cache_parameters[CacheSchedule::place_of(generation)]);
-    renew(generation);
+  set_parameters(state_.fitted, start);
+  trace(0);
+  learn_from_start();
+  const int generation = light_generation_at(state_.next_iteration - 1, options_.iterations);
+  if (generation > 0) {
+    set_parameters(state_.fitted, state_.light_parameters);
+    trace(generation);
   }
+  retarget(cache_.pixels, inputs_.edited, state_.displacements);
   set_parameters(state_.fitted, current);
+  evaluate();
 }
 
 void Fit::iterate() {
   const int iteration = state_.next_iteration;
-  const size_t turn = schedule_.place_at(iteration);
-  if (schedule_.begins_at(iteration)) {
-    renew(schedule_.newest_at(iteration));
-    state_.cache_parameters[turn] = parameters_of(state_.fitted);
+  const bool is_traced = is_light_traced_at(iteration, options_.iterations);
+  const bool is_aligned = !options_.keep_in_place && is_aligned_at(iteration, options_.iterations);
+  if (is_aligned) {
+    align(state_.displacements, rendered(), inputs_.edited, weights_);
+    retarget(cache_.pixels, inputs_.edited, state_.displacements);
   }
-  if (!options_.keep_in_place && is_aligned_at(iteration, options_.iterations)) {
-    align(state_, pixels_, inputs_.edited, weights_, gain_);
-    retarget(pixels_, inputs_.edited, state_.displacements);
-    for (LightCache& cache : caches_) cache.pixels = pixels_;
+  if (is_traced) {
+    trace(light_generation_at(iteration, options_.iterations));
+    if (iteration == 0) learn_from_start();
+    state_.light_parameters = parameters_of(state_.fitted);
   }
-  state_.loss.push_back(
-      evaluator_.evaluate(caches_[turn], all_but(state_.cache_radiance, turn), state_.cache_radiance[turn]));
-  step(state_, evaluator_.d_delta(), options_);
+  if (is_traced || is_aligned) evaluate();
+
+  const Parameters before = parameters_of(state_.fitted);
+  const double objective_before = objective(state_, evaluator_);
+  set_parameters(state_.fitted, sum_of(before, solve_step(state_, evaluator_, options_.iterations)));
+  float loss = evaluate();
+  if (objective(state_, evaluator_) < objective_before) {
+    state_.damping = std::max(state_.damping / kRelax, kMinDamping);
+  } else {
+    state_.damping = std::min(state_.damping * kTighten, kMaxDamping);
+    set_parameters(state_.fitted, before);
+    loss = evaluate();
+  }
+  state_.loss.push_back(loss);
   ++state_.next_iteration;
-  if (state_.next_iteration == options_.iterations * 3 / 4)
-    state_.late_parameters = parameters_of(state_.fitted);
   progress_.update("fit", state_.next_iteration, options_.iterations);
 }
 
 std::vector<Image> Fit::rendered() const {
-  return rendered_views(state_, pixels_, inputs_.edited, gain_);
-}
-
-void Fit::choose_best() {
-  if (state_.fitted.empty()) return;
-  LightCache &cache = caches_[0], &other = caches_[1];
-  trace(cache, CacheSchedule::kJudge);
-  trace(other, CacheSchedule::kJudge + 1);
-  // Losses of different caches differ by more than the last iterations win, so all candidates meet the same
-  // one.
-  Parameters best;
-  float best_loss = std::numeric_limits<float>::infinity();
-  std::vector<vec3> radiance;
-  for (const Parameters& candidate : {parameters_of(state_.fitted), state_.late_parameters, untouched_}) {
-    set_parameters(state_.fitted, candidate);
-    const std::vector<vec3> of_other = evaluator_.shade_pixels(other);
-    const float loss = evaluator_.evaluate(cache, std::vector<std::span<const vec3>>{of_other}, radiance);
-    if (loss < best_loss) best = candidate, best_loss = loss;
-  }
-  set_parameters(state_.fitted, best);
-  psnr_ = psnr_of(cache, evaluator_.shade_pixels(cache), gain_);
+  return rendered_views(evaluator_.radiance(), cache_.pixels, inputs_.edited, gain_);
 }
 
 FitResult Fit::take_result() {
   FitResult result = result_of(scene_, state_, base_, inputs_.strength, options_.fill_unseen);
-  result.psnr = psnr_;
+  result.psnr = psnr_of(cache_.pixels, evaluator_.radiance(), gain_);
   return result;
 }
 
 FitResult fit_materials(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
                         const FitHooks& hooks, const Progress& progress) {
   Fit fit(scene, inputs, options, progress);
-  if (hooks.resume)
-    fit.resume(*hooks.resume);
-  else
-    fit.start();
+  if (hooks.resume) fit.resume(*hooks.resume);
   try {
     run(fit, hooks, progress);
   } catch (const Error& error) {
@@ -184,7 +183,6 @@ FitResult fit_materials(const render::Scene& scene, const FitInputs& inputs, con
     }
     throw;
   }
-  fit.choose_best();
   return fit.take_result();
 }
 

@@ -2,12 +2,10 @@
 // [Hadadan2025, Sec. 4 and 5].
 #pragma once
 
-#include <array>
 #include <span>
 #include <vector>
 
 #include "patina/base/progress.h"
-#include "patina/inverse/cache_schedule.h"
 #include "patina/inverse/evaluate.h"
 #include "patina/inverse/fit_options.h"
 #include "patina/inverse/fit_state.h"
@@ -22,8 +20,8 @@ namespace patina::inverse {
 FitResult fit_materials(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
                         const FitHooks& hooks, const Progress& progress);
 
-/// The same step by step: start or resume, iterate while there is work, choose the best, take the result.
-/// Refers to the scene, the views and the edited images.
+/// The same step by step: start or resume, iterate while there is work, take the result. Refers to the scene,
+/// the views and the edited images.
 class Fit {
  public:
   Fit(const render::Scene& scene, const FitInputs& inputs, const FitOptions& options,
@@ -31,46 +29,39 @@ class Fit {
   Fit(const Fit&) = delete;
   Fit& operator=(const Fit&) = delete;
 
-  /// Casts the rays of the first light caches.
-  void start();
   /// Goes on where `checkpoint` was made. Throws Error{kFormat} if it belongs to another fit.
   void resume(const FitCheckpoint& checkpoint);
 
   bool has_work() const;
-  /// One step of descent. Interrupted, it leaves the state as the last iteration left it.
+  /// One step. Interrupted, it leaves the state as the last iteration left it.
   void iterate();
   int num_done() const { return state_.next_iteration; }
 
   FitCheckpoint checkpoint() const { return make_checkpoint(state_); }
-  /// The views, sRGB [H,W,3], as the light caches show them: noisy, black where pixels count nothing.
+  /// The views, sRGB [H,W,3], as the light cache shows them: black where pixels count nothing.
   std::vector<Image> rendered() const;
   std::span<const float> loss() const { return state_.loss; }
 
-  /// Takes the best of the last textures, those after three quarters of the iterations, and the first, by
-  /// light caches that no iteration saw.
-  void choose_best();
   /// What has been found so far. The end of this fit.
   FitResult take_result();
 
  private:
-  void trace(LightCache& cache, int generation);
-  LightCache& renew(int generation);
+  void trace(int generation);
+  void learn_from_start();
+  float evaluate() { return evaluator_.evaluate(cache_); }
 
   const render::Scene& scene_;
   const FitInputs inputs_;
   const FitOptions options_;
   const Progress& progress_;
-  const float gain_;  // 2^exposure_ev
-  const CacheSchedule schedule_;
+  const float gain_;                             // 2^exposure_ev
   const std::vector<Image> weights_;             // of each view's pixels
-  std::vector<CachePixel> pixels_;               // that count, and toward what
+  LightCache cache_;                             // its pixels: those that count, and toward what
   const std::vector<asset::MaterialMaps> base_;  // starting maps at the size that they will be written with
+  std::vector<SeenPoint> seen_;                  // until the evaluator has them
   FitState state_;
-  const Parameters untouched_;
   const std::vector<asset::MaterialMaps> coarse_;  // starting maps at the size of the fields
   Evaluator evaluator_;
-  std::array<LightCache, CacheSchedule::kPlaces> caches_;
-  float psnr_ = 0;  // of the chosen textures
 };
 
 }  // namespace patina::inverse

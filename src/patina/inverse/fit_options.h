@@ -23,23 +23,26 @@ struct FitInputs {
   // How strongly, one map a material (asset/strength_map.h): texels at zero keep their value. Empty:
   // everything may change.
   std::span<const asset::Map> strength{};
+  // The views before they were edited, as `edited` has them. What the fit's own light shows of the materials
+  // as they are is compared with them, so that what was not edited stays. Empty: its light is taken as it is.
+  std::span<const Image> clean{};
 };
 
 /// FitOptions::texture_size: a power of two that keeps what the views resolve, never below the asset's own.
 inline constexpr int kAutoTextureSize = -1;
 
 struct FitOptions {
-  int iterations = 200;
+  int iterations = 24;
   int texture_size = 0;  // texels a side of fitted maps; 0: the asset's own size, or what the views resolve
                          // for factor-only slots; kAutoTextureSize
-  asset::MapSet maps = asset::set_of(
-      {asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kNormal});  // that may change
-  float learning_rate = 0.02f;  // Adam, a texel value in [0,1]
-  int light_samples = 8;        // incident directions kept a pixel
-  int max_depth = 4;            // of the paths that gather incident light
-  int boundary_pixels = 3;      // pixels beside silhouettes and depth edges that do not count
-  bool fill_unseen = true;      // unseen texels get the change around them (unseen.h)
-  bool keep_in_place = false;   // do not move views that disagree toward each other (alignment.h)
+  asset::MapSet maps =
+      asset::set_of({asset::MapSlot::kBaseColor, asset::MapSlot::kRoughness, asset::MapSlot::kMetallic,
+                     asset::MapSlot::kNormal});  // that may change
+  int light_samples = 8;       // incident directions traced from a point; each pixel has up to eight
+  int max_depth = 4;           // of the paths that gather incident light
+  int boundary_pixels = 3;     // pixels beside silhouettes and depth edges that do not count
+  bool fill_unseen = true;     // unseen texels get the change around them (unseen.h)
+  bool keep_in_place = false;  // do not move views that disagree toward each other (alignment.h)
   uint64_t seed = 0;
 };
 
@@ -67,8 +70,8 @@ struct FitResult {
 
 /// How far a fit has come.
 struct FitPreview {
-  std::span<const Image> rendered;  // one a view, sRGB [H,W,3], as the light caches show it: noisy; black
-                                    // where pixels count nothing
+  std::span<const Image> rendered;  // one a view, sRGB [H,W,3], as the light cache shows it; black where
+                                    // pixels count nothing
   std::span<const float> loss;      // per iteration so far
 };
 

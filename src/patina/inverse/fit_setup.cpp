@@ -7,7 +7,6 @@
 #include "patina/base/check.h"
 #include "patina/base/error.h"
 #include "patina/inverse/alignment.h"
-#include "patina/inverse/cache_schedule.h"
 #include "patina/inverse/fit_slots.h"
 #include "patina/inverse/loss.h"
 
@@ -57,10 +56,9 @@ Image changeable(const Image& evidence, const Image& covered) {
 }
 
 std::vector<FittedMap> make_fitted_maps(const render::Scene& scene, const FitInputs& inputs,
-                                        std::span<const CachePixel> pixels,
+                                        std::span<const CachePixel> pixels, std::span<const SeenPoint> seen,
                                         std::span<const asset::MaterialMaps> base,
                                         const FitOptions& options) {
-  const std::vector<SeenPoint> seen = trace_seen_points(scene, inputs.views, pixels);
   std::vector<FittedMap> fitted;
   for (int m = 0; m < scene.num_asset_materials(); ++m) {
     if (!is_chosen(inputs, m)) continue;
@@ -104,6 +102,9 @@ FitInputs checked(const FitInputs& inputs, const render::Scene& scene) {
                       " pixels of 3 channels, found " + std::to_string(edited[v].width) + " x " +
                       std::to_string(edited[v].height) + " of " + std::to_string(edited[v].channels));
   }
+  PATINA_CHECK(inputs.clean.empty() || inputs.clean.size() == views.size());
+  for (size_t v = 0; v < inputs.clean.size(); ++v)
+    PATINA_CHECK(inputs.clean[v].width == edited[v].width && inputs.clean[v].height == edited[v].height);
   PATINA_CHECK(inputs.materials.empty() ||
                static_cast<int>(inputs.materials.size()) == scene.num_asset_materials());
   return inputs;
@@ -143,13 +144,11 @@ std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const
 }
 
 FitState initial_state(const render::Scene& scene, const FitInputs& inputs,
-                       std::span<const CachePixel> pixels, std::span<const asset::MaterialMaps> base,
-                       const FitOptions& options) {
+                       std::span<const CachePixel> pixels, std::span<const SeenPoint> seen,
+                       std::span<const asset::MaterialMaps> base, const FitOptions& options) {
   FitState state;
-  state.fitted = make_fitted_maps(scene, inputs, pixels, base, options);
-  state.late_parameters = parameters_of(state.fitted);
-  state.cache_parameters.assign(CacheSchedule::kPlaces, state.late_parameters);
-  state.cache_radiance.assign(CacheSchedule::kPlaces, std::vector<vec3>(pixels.size(), vec3(0.0f)));
+  state.fitted = make_fitted_maps(scene, inputs, pixels, seen, base, options);
+  state.light_parameters = parameters_of(state.fitted);
   for (const views::View& view : inputs.views.views)
     state.displacements.push_back(no_displacement(view.gbuffer.width, view.gbuffer.height));
   return state;

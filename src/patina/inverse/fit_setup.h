@@ -20,10 +20,10 @@ std::vector<Image> view_weights(const render::Scene& scene, const FitInputs& inp
 std::vector<asset::MaterialMaps> enlarged_maps(const render::Scene& scene, const FitInputs& inputs,
                                                std::span<const CachePixel> pixels, const FitOptions& options);
 
-/// The state before the first iteration; `base` from enlarged_maps. No fitted maps where no view shows a
-/// surface with UVs and a material that may change.
+/// The state before the first iteration; `seen` from trace_seen_points, `base` from enlarged_maps. No fitted
+/// maps where no view shows a surface with UVs and a material that may change.
 FitState initial_state(const render::Scene& scene, const FitInputs& inputs,
-                       std::span<const CachePixel> pixels, std::span<const asset::MaterialMaps> base,
-                       const FitOptions& options);
+                       std::span<const CachePixel> pixels, std::span<const SeenPoint> seen,
+                       std::span<const asset::MaterialMaps> base, const FitOptions& options);
 
 }  // namespace patina::inverse

@@ -10,12 +10,12 @@
 namespace patina::inverse {
 
 /// The prior on a fitted map. Each pyramid level holds detail of one size; `detail` is the cost of a texel's
-/// squared coefficient at the finest level, in units of one fully weighted pixel's loss, a quarter of that a
-/// level up, and so on: where the views say little, the smoother answer wins, while large areas move freely.
-/// Coefficients far beyond `knee` cost only linearly, so that true edges stay sharp. `change` is the cost of
-/// the squared change itself, which holds what the views leave undecided.
+/// squared coefficient at the finest level, in units of one fully weighted pixel's loss, and `coarser` times
+/// that a level up, and so on: where the views say little, the smoother answer wins, while large areas move
+/// freely. Coefficients far beyond `knee` cost only linearly, so that true edges stay sharp. `change` is the
+/// cost of the squared change itself, which holds what the views leave undecided.
 struct Prior {
-  float detail, knee, change;
+  float detail, coarser, knee, change;
 };
 
 struct FitSlot {
@@ -26,42 +26,41 @@ struct FitSlot {
   // Share of the iterations at which the map joins: while a colour is far too bright, a smoother or tilted
   // surface also darkens it, and roughness would run into a mirror from which no gradient leads back.
   float start;
-  // Share of the learning rate. What renders hardly depend on, or depend on through noise, must walk slowly:
-  // Adam takes steps of one size whether the gradient is signal or noise.
-  float rate;
   // Whether the change goes on over surface that no view saw. Tangent frames turn from place to place, so
   // what is smooth says nothing about normals there.
   bool fills_unseen;
+  // Whether texels of one kind change alike (material_kinds.h).
+  bool follows_kinds;
 };
 
 inline constexpr std::array<FitSlot, asset::kNumMapSlots> kFitSlots{{
     {asset::MapSlot::kBaseColor,
      offsetof(MapValues, base_color) / sizeof(float),
      3,
-     {3.0f, 0.05f, 1e-3f},
+     {3.0f, 0.25f, 0.05f, 1e-3f},
      0.0f,
-     1.0f,
-     true},
+     true,
+     false},
     {asset::MapSlot::kRoughness,
      offsetof(MapValues, roughness) / sizeof(float),
      1,
-     {2.0f, 0.1f, 2e-3f},
+     {40.0f, 1.0f, 0.1f, 0.0f},
      0.05f,
-     0.35f,
+     true,
      true},
     {asset::MapSlot::kMetallic,
      offsetof(MapValues, metallic) / sizeof(float),
      1,
-     {0.2f, 0.1f, 1e-3f},
+     {20.0f, 1.0f, 0.1f, 0.1f},
      0.05f,
-     0.35f,
+     true,
      true},
     {asset::MapSlot::kNormal,
      offsetof(MapValues, normal) / sizeof(float),
      2,
-     {16.0f, 0.1f, 6.0f},
+     {16.0f, 0.25f, 0.1f, 6.0f},
      0.15f,
-     0.07f,
+     false,
      false},
 }};
 

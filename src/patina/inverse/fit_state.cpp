@@ -6,6 +6,7 @@
 #include "patina/asset/texel_raster.h"
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
+#include "patina/inverse/light_schedule.h"
 
 namespace patina::inverse {
 namespace {
@@ -34,17 +35,17 @@ class Reader {
   void expect_end() const {
     if (!bytes_.empty()) fail();
   }
-
- private:
   [[noreturn]] static void fail() {
     throw Error(ErrorCode::kFormat, "fit checkpoint",
                 "belongs to other textures or options than this fit has; delete it to start the fit anew");
   }
+
+ private:
   std::span<const uint8_t> bytes_;
 };
 
 template <class Archive>
-void each_parameter(Archive&& archive, auto& parameters) {
+void each_parameter(Archive&& archive, auto&& parameters) {
   for (auto& levels : parameters)
     for (auto& level : levels) archive(level.pixels);
 }
@@ -111,21 +112,22 @@ void set_parameters(std::vector<FittedMap>& fitted, const Parameters& parameters
   }
 }
 
+Parameters sum_of(Parameters a, const Parameters& b) {
+  for (size_t f = 0; f < a.size(); ++f)
+    for (size_t level = 0; level < a[f].size(); ++level)
+      for (size_t i = 0; i < a[f][level].pixels.size(); ++i) a[f][level].pixels[i] += b[f][level].pixels[i];
+  return a;
+}
+
 FitCheckpoint make_checkpoint(const FitState& state) {
   FitCheckpoint checkpoint;
   checkpoint.next_iteration = state.next_iteration;
   std::vector<uint8_t>& bytes = checkpoint.bytes;
   const auto write = [&](const std::vector<float>& values) { append(bytes, values); };
-  for (const FittedMap& map : state.fitted) {
-    append(bytes, map.field.num_steps.data(), map.field.num_steps.size() * sizeof(int));
-    for (const auto* images : {&map.field.levels, &map.field.first_moment, &map.field.second_moment})
-      for (const Image& image : *images) write(image.pixels);
-  }
-  for (const Parameters& parameters : state.cache_parameters) each_parameter(write, parameters);
-  for (const auto& radiance : state.cache_radiance)
-    append(bytes, radiance.data(), radiance.size() * sizeof(vec3));
+  append(bytes, &state.damping, sizeof state.damping);
+  each_parameter(write, parameters_of(state.fitted));
+  each_parameter(write, state.light_parameters);
   for (const Image& displacement : state.displacements) write(displacement.pixels);
-  each_parameter(write, state.late_parameters);
   write(state.loss);
   return checkpoint;
 }
@@ -134,17 +136,12 @@ void restore_checkpoint(FitState& state, const FitCheckpoint& checkpoint) {
   Reader reader(checkpoint.bytes);
   const auto read = [&](std::vector<float>& values) { reader.read(values); };
   state.next_iteration = checkpoint.next_iteration;
-  for (FittedMap& map : state.fitted) {
-    reader.read(map.field.num_steps.data(), map.field.num_steps.size() * sizeof(int));
-    for (auto* images : {&map.field.levels, &map.field.first_moment, &map.field.second_moment})
-      for (Image& image : *images) read(image.pixels);
-    compose(map.field);
-  }
-  for (Parameters& parameters : state.cache_parameters) each_parameter(read, parameters);
-  for (auto& radiance : state.cache_radiance) reader.read(radiance.data(), radiance.size() * sizeof(vec3));
+  reader.read(&state.damping, sizeof state.damping);
+  Parameters parameters = parameters_of(state.fitted);
+  each_parameter(read, parameters);
+  set_parameters(state.fitted, parameters);
+  each_parameter(read, state.light_parameters);
   for (Image& displacement : state.displacements) read(displacement.pixels);
-  state.late_parameters = parameters_of(state.fitted);
-  each_parameter(read, state.late_parameters);
   state.loss.resize(static_cast<size_t>(std::max(0, state.next_iteration)));
   read(state.loss);
   reader.expect_end();

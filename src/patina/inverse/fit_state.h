@@ -41,17 +41,16 @@ std::vector<asset::MaterialMaps> shrunk(const std::vector<asset::MaterialMaps>& 
 using Parameters = std::vector<std::vector<Image>>;
 Parameters parameters_of(std::span<const FittedMap> fitted);
 void set_parameters(std::vector<FittedMap>& fitted, const Parameters& parameters);
+Parameters sum_of(Parameters a, const Parameters& b);
 
 /// Everything that the next iteration depends on.
 struct FitState {
   int next_iteration = 0;
+  float damping = 0.01f;  // Marquardt's, of the next step
   std::vector<FittedMap> fitted;
-  std::vector<Parameters> cache_parameters;  // with which each of the present light caches was traced
-  std::vector<std::vector<vec3>>
-      cache_radiance;                // of every pixel, as each cache showed it when it was last looked at
+  Parameters light_parameters;       // with which the light was traced last
   std::vector<Image> displacements;  // of each edited view (alignment.h)
-  Parameters late_parameters;  // after three quarters of the iterations: a candidate beside the last ones
-  std::vector<float> loss;     // per iteration
+  std::vector<float> loss;           // per iteration
 };
 
 FitCheckpoint make_checkpoint(const FitState& state);

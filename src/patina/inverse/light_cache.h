@@ -1,7 +1,6 @@
-// The light cache: for a jittered point of every pixel that counts, the surface it hits and the light
-// that arrives there, traced once and kept in eight bytes a direction. Geometry, cameras and lights never
-// change while textures are fitted, so an iteration shades and differentiates these lists without casting a
-// ray (shade.h).
+// The light cache: for every pixel that counts, the surface that it shows and the light that arrives there,
+// in a list of directions of eight bytes each. Geometry, cameras and lights never change while textures are
+// fitted, so an iteration shades and differentiates these lists without casting a ray (shade.h).
 #pragma once
 
 #include <cstdint>
@@ -20,12 +19,15 @@ struct PackedLight {
   uint32_t radiance = 0;
 };
 
-/// What a pixel's camera ray met.
+/// A surface that a pixel shows: all of it, or where different ones meet in a pixel, its share of it. What a
+/// pixel reflects is not what its mean material would: half metal, half paint is not a half-metal.
 struct CacheSample {
-  MaterialPoint point;
-  MapValues base;       // the starting maps at the point, before any change
+  uint32_t pixel = 0;
+  float share = 1;      // of the pixel; those of a pixel add up to one
+  MaterialPoint point;  // halfway between its points, with the UVs of one of them
+  MapValues base;       // mean of the starting maps over it
   vec3 emission{0.0f};  // W/m²/sr
-  bool hit = false;     // false: the ray met nothing, the pixel is black
+  float extent = 0;     // how much the normal turns within it: squared radius of a disc of normals, rad²
 };
 
 /// A pixel that counts in the loss.
@@ -34,26 +36,32 @@ struct CachePixel {
   uint16_t x = 0, y = 0;
   float weight = 0;   // from loss_weight
   vec3 target{0.0f};  // tone-mapped linear
+  // Factor on what the cache shows of the pixel, so that it shows the clean render at the start.
+  vec3 calibration{1.0f};
 };
 
 struct LightCache {
-  std::vector<CachePixel> pixels;    // view by view, rows from the top
-  std::vector<CacheSample> samples;  // [pixels]
-  std::vector<PackedLight> lights;   // [pixels, lights_per_pixel]
-  int lights_per_pixel = 0;
+  std::vector<CachePixel> pixels;      // view by view, rows from the top
+  std::vector<CacheSample> samples;    // pixel by pixel; of a pixel that shows nothing none
+  std::vector<uint32_t> first_sample;  // [pixels + 1] into samples
+  std::vector<PackedLight> lights;     // [samples, lights_per_sample]
+  int lights_per_sample = 0;
 
-  std::span<const PackedLight> lights_of(size_t pixel) const {
-    const auto n = static_cast<size_t>(lights_per_pixel);
-    return {lights.data() + pixel * n, n};
+  std::span<const CacheSample> samples_of(size_t pixel) const {
+    return std::span(samples).subspan(first_sample[pixel], first_sample[pixel + 1] - first_sample[pixel]);
+  }
+  std::span<const PackedLight> lights_of(size_t sample) const {
+    const auto n = static_cast<size_t>(lights_per_sample);
+    return {lights.data() + sample * n, n};
   }
   size_t bytes() const;
 };
 
 struct CacheOptions {
-  int light_samples = 8;  // directions a pixel
+  int light_samples = 8;  // directions a trace
+  int traces = 8;         // of each pixel, at different points in it
   int max_depth = 4;      // path segments after the camera ray
-  uint64_t seed = 0;
-  uint32_t generation = 0;  // another one gives other points and directions
+  uint64_t seed = 0;      // the same one gives the same points and, as far as materials allow, directions
 };
 
 /// The pixels of all views with a positive weight. targets [H,W,3] tone-mapped linear, weights [H,W,1]; one
@@ -61,12 +69,11 @@ struct CacheOptions {
 std::vector<CachePixel> select_pixels(const views::ViewSet& views, std::span<const Image> targets,
                                       std::span<const Image> weights);
 
-/// Traces samples and lights of `cache`, whose pixels are given; memory that it holds is used again. The
-/// asset wears `asset_materials`: directions follow them, and so does the light that its surfaces reflect.
-/// `base_maps` are the starting maps from which CacheSample::base is read.
-void trace_cache(LightCache& cache, const render::Scene& scene,
-                 std::span<const asset::MaterialMaps> asset_materials,
-                 std::span<const asset::MaterialMaps> base_maps, const views::ViewSet& views,
+/// Fills the lights of `cache`, whose samples are given (seen_points.h). The asset wears `asset_materials`:
+/// directions follow them, and so does the light that its surfaces reflect. Each sample also gets what was
+/// traced for the pixels around it that show the same smooth surface, since light changes slowly along it.
+void trace_light(LightCache& cache, const render::Scene& scene,
+                 std::span<const asset::MaterialMaps> asset_materials, const views::ViewSet& views,
                  const CacheOptions& options, const Progress& progress);
 
 }  // namespace patina::inverse

@@ -38,16 +38,17 @@ bool is_depth_edge(const views::GBuffer& g, size_t a, size_t b) {
 
 }  // namespace
 
-PixelLoss relative_l2(const vec3& radiance, const vec3& other, const vec3& target, float gain) {
-  PixelLoss loss;
+PixelResidual relative_residual(const vec3& radiance, const vec3& target, float gain) {
+  PixelResidual residual;
   for (int c = 0; c < 3; ++c) {
-    const float mapped = reinhard(gain * radiance[c]), mapped_other = reinhard(gain * other[c]);
-    const float reference = std::max(mapped_other, target[c]);
-    const float scale = 1.0f / (3.0f * (reference * reference + kLossEpsilon));
-    loss.value += scale * (mapped - target[c]) * (mapped_other - target[c]);
-    loss.d_radiance[c] = 2.0f * scale * (mapped_other - target[c]) * gain * d_reinhard(gain * radiance[c]);
+    const float mapped = reinhard(gain * radiance[c]);
+    if (target[c] >= kClippedTarget && mapped >= target[c]) continue;
+    const float reference = std::max(mapped, target[c]);
+    const float scale = 1.0f / std::sqrt(3.0f * (reference * reference + kLossEpsilon));
+    residual.value[c] = scale * (mapped - target[c]);
+    residual.d_radiance[c] = scale * gain * d_reinhard(gain * radiance[c]);
   }
-  return loss;
+  return residual;
 }
 
 Image loss_target(const Image& edited) {

@@ -17,20 +17,20 @@ inline constexpr float kLossEpsilon = 0.01f;
 /// Below this cosine between surface normal and view direction (60°) a pixel's weight falls linearly to zero.
 inline constexpr float kGrazingCosine = 0.5f;
 
-/// Mean over the three channels of (I−T)²/(sg(I)²+ε) for I = reinhard(gain · radiance), and its derivative.
-/// The square is a product of two independent estimates of I, because E[(I−T)²] of one noisy estimate also
-/// holds its variance, and descending that prefers materials that render with less noise [Gkioulekas2016,
-/// Sec. 5]: `radiance` is the one that is differentiated, `other` gives the second factor and, as max(I, T)
-/// so that an estimate near zero cannot outweigh all others, the denominator. With other == radiance it is
-/// the plain loss.
-struct PixelLoss {
-  float value = 0;        // may be negative where noise exceeds error; unbiased
-  vec3 d_radiance{0.0f};  // linear HDR; the derivative of the whole square: both factors' when they are equal
+/// The three residuals of a pixel, (I−T) / √(3 (max(I,T)² + ε)) for I = reinhard(gain · radiance): the sum of
+/// their squares is its loss, a relative error. The denominator is held fixed in derivatives. A target that
+/// is clipped white says only that the pixel is at least that bright: brighter renders have no residual.
+struct PixelResidual {
+  vec3 value{0.0f};
+  vec3 d_radiance{0.0f};  // of each channel's residual with respect to that channel's linear HDR radiance
 };
 
-/// `radiance`, `other`: linear HDR, >= 0. `target`: tone-mapped linear in [0,1], linear_from_srgb of the
-/// edited view. `gain` = 2^exposure_ev.
-PixelLoss relative_l2(const vec3& radiance, const vec3& other, const vec3& target, float gain);
+/// `radiance`: linear HDR, >= 0. `target`: tone-mapped linear in [0,1], linear_from_srgb of the edited view.
+/// `gain` = 2^exposure_ev.
+PixelResidual relative_residual(const vec3& radiance, const vec3& target, float gain);
+
+/// Tone-mapped linear values from here on (sRGB 250 of 255) count as clipped.
+inline constexpr float kClippedTarget = 0.956f;
 
 /// Pixels of the edited view as the loss wants them: linear_from_srgb, clamped to [0,1].
 Image loss_target(const Image& edited);

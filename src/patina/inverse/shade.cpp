@@ -31,18 +31,17 @@ enum Term : size_t {
   kSpecular,
   kSchlick,
   kNormalI,       // n·wi
-  kNormalH,       // n·h
-  kInverseH,      // 1 / |wo + wi|
-  kInverseBase,   // 1 / (sin²θh + α² cos²θh)
   kInverseRootI,  // 1 / √(α² + (1−α²)(n·wi)²)
   kVisibilityI,   // Smith's masking of wi, over 2 n·wi
+  kByAlpha2,      // d ln D / d α²
+  kAlongH,        // d ln D / d n·h, over |wo + wi|
   kNumTerms
 };
 constexpr size_t kStepSize = kNumTerms * kWidth;
 
 struct PointTerms {
   vec3 n, wo;
-  float alpha, alpha2, n_o, root_o, visibility_o;
+  float alpha, alpha2, extent, n_o, root_o, visibility_o;
 };
 PointTerms point_terms(const CacheSample& sample, const Shading& shading) {
   PointTerms t;
@@ -50,6 +49,7 @@ PointTerms point_terms(const CacheSample& sample, const Shading& shading) {
   t.wo = sample.point.wo;
   t.alpha = render::alpha_from_roughness(shading.bsdf.roughness);
   t.alpha2 = t.alpha * t.alpha;
+  t.extent = sample.extent;
   t.n_o = glm::dot(t.n, t.wo);
   t.root_o = std::sqrt(t.alpha2 + (1.0f - t.alpha2) * t.n_o * t.n_o);
   t.visibility_o = 1.0f / (t.n_o + t.root_o);
@@ -62,7 +62,8 @@ inline __attribute__((always_inline)) void fill_step(const PackedLight* lights, 
                                                      float* step) {
   const float nx = t.n.x, ny = t.n.y, nz = t.n.z, ox = t.wo.x, oy = t.wo.y, oz = t.wo.z;
   const float alpha2 = t.alpha2, one_minus_alpha2 = 1.0f - t.alpha2;
-  const float specular_scale = alpha2 * kInvPi * t.visibility_o;
+  const float specular_scale = kInvPi * t.visibility_o, rho2 = t.extent;
+  const float one_over_alpha2 = 1.0f / alpha2;
   for (size_t k = 0; k < kWidth; ++k) {
     // As unpack_direction and unpack_radiance do.
     const uint32_t d = lights[k].direction;
@@ -90,22 +91,37 @@ inline __attribute__((always_inline)) void fill_step(const PackedLight* lights, 
     const float inverse_h = 1.0f / std::sqrt(length2_h > 1e-12f ? length2_h : 1e-12f);
     const float n_h = (nx * hx + ny * hy + nz * hz) * inverse_h;
     const float cx = ny * hz - nz * hy, cy = nz * hx - nx * hz, cz = nx * hy - ny * hx;
-    // At least α² for unit vectors; without a half vector it would be nothing.
-    const float base = (cx * cx + cy * cy + cz * cz) * inverse_h * inverse_h + alpha2 * n_h * n_h;
-    const float one_over_base = 1.0f / (base > 1e-7f ? base : 1e-7f);
+    const float o_h = (ox * hx + oy * hy + oz * hz) * inverse_h;
+    // The mean of GGX's D over normals that lie within ρ of this one. In slopes D is the form factor
+    // density of a plane seen from α above it, so its mean over a disc is that of a disc:
+    //   D = 2 α² / (π R (R + A)),  A = sin²θh + α² cos²θh − ρ²,  R² = A² + 4 α² ρ² cos²θh.
+    const float c = n_h * n_h;
+    const float base = (cx * cx + cy * cy + cz * cz) * inverse_h * inverse_h + alpha2 * c;
+    const float a = base - rho2, bulge = 4.0f * alpha2 * rho2 * c;
+    const float r2 = a * a + bulge > 1e-14f ? a * a + bulge : 1e-14f;
+    const float one_over_root_d = 1.0f / std::sqrt(r2), root_d = r2 * one_over_root_d;
+    // R + A without cancellation where A < 0.
+    const float far = bulge / (root_d - a > 1e-7f ? root_d - a : 1e-7f);
+    const float sum = a > 0.0f ? root_d + a : far;
+    const float one_over_sum = 1.0f / (sum > 1e-14f ? sum : 1e-14f);
+    const float by_alpha = c * (a + 2.0f * rho2) * one_over_root_d;
+    const float by_c = (one_minus_alpha2 * a - 2.0f * alpha2 * rho2) * one_over_root_d;
     const float lit = n_i > 0.0f ? n_i : 0.0f;
     const float one_over_root = 1.0f / std::sqrt(alpha2 + one_minus_alpha2 * n_i * n_i);
     const float root_i = (alpha2 + one_minus_alpha2 * n_i * n_i) * one_over_root;
     const float masking = 1.0f / (std::abs(n_i) + root_i);
-    const float o_h = (ox * hx + oy * hy + oz * hz) * inverse_h;
     const float m = 1.0f - o_h > 0.0f ? 1.0f - o_h : 0.0f;
-    step[kNormalI * kWidth + k] = n_i, step[kNormalH * kWidth + k] = n_h,
-                             step[kInverseH * kWidth + k] = inverse_h;
-    step[kInverseBase * kWidth + k] = one_over_base, step[kInverseRootI * kWidth + k] = one_over_root,
-                                 step[kVisibilityI * kWidth + k] = masking;
+    step[kNormalI * kWidth + k] = n_i;
+    step[kInverseRootI * kWidth + k] = one_over_root;
+    step[kVisibilityI * kWidth + k] = masking;
+    step[kByAlpha2 * kWidth + k] =
+        one_over_alpha2 - by_alpha * one_over_root_d - (by_alpha + c) * one_over_sum;
+    step[kAlongH * kWidth + k] =
+        2.0f * n_h * inverse_h * (by_c * one_over_root_d + (by_c + one_minus_alpha2) * one_over_sum);
     step[kSchlick * kWidth + k] = m * m * m * m * m;
     step[kDiffuse * kWidth + k] = lit * kInvPi;
-    step[kSpecular * kWidth + k] = specular_scale * one_over_base * one_over_base * lit * masking;
+    step[kSpecular * kWidth + k] =
+        specular_scale * 2.0f * alpha2 * one_over_root_d * one_over_sum * lit * masking;
   }
 }
 
@@ -161,11 +177,11 @@ struct GradientSums {
 PATINA_VECTOR_CLONES
 GradientSums sum_gradients(size_t num_lights, const PointTerms& t, float metallic, const vec3& g,
                            const vec3& g_base, const float* terms) {
-  const float one_minus_alpha2 = 1.0f - t.alpha2;
+  const float one_minus_alpha2 = 1.0f - t.alpha2, two_alpha = 2.0f * t.alpha;
   // d V_o / d n = −V_o (1 + (1−α²) n·wo / root) wo, relative to V_o; and the same for the derivative by α.
   const float normal_o = -t.visibility_o * (1.0f + one_minus_alpha2 * t.n_o / t.root_o);
   const float alpha_o = -t.visibility_o * t.alpha * (1.0f - t.n_o * t.n_o) / t.root_o;
-  const float of_alpha = 2.0f / t.alpha + alpha_o, alpha = t.alpha, m = metallic;
+  const float alpha = t.alpha, m = metallic;
   const float gx = g.x, gy = g.y, gz = g.z, bx = g_base.x, by = g_base.y, bz = g_base.z;
   Lanes d_alpha, d_metallic, along_wo, along_x, along_y, along_z;
   for (size_t first = 0; first < num_lights; first += kWidth, terms += kStepSize) {
@@ -184,18 +200,16 @@ GradientSums sum_gradients(size_t num_lights, const PointTerms& t, float metalli
       // What multiplies the specular and the diffuse lobe once channels are summed.
       const float by_specular =
           specular * (light_base * m * (1.0f - s) + light * ((1.0f - m) * fresnel + m * s));
-      const float n_i = step[kNormalI * kWidth + k], n_h = step[kNormalH * kWidth + k];
+      const float n_i = step[kNormalI * kWidth + k];
       const float by_diffuse = light_base * (1.0f - m) * (1.0f - fresnel) * (n_i > 0.0f ? kInvPi : 0.0f);
 
-      const float visibility = step[kVisibilityI * kWidth + k],
-                  inverse_base = step[kInverseBase * kWidth + k];
+      const float visibility = step[kVisibilityI * kWidth + k];
       const float masking = visibility * step[kInverseRootI * kWidth + k];
-      d_alpha.sum[k] += by_specular * (of_alpha - 4.0f * alpha * n_h * n_h * inverse_base -
+      d_alpha.sum[k] += by_specular * (two_alpha * step[kByAlpha2 * kWidth + k] + alpha_o -
                                        masking * alpha * (1.0f - n_i * n_i));
-      // d ln(specular) / dn = 4 (n·h)(1−α²)/base · h + (masking terms) wo, wi + wi / n·wi, up to multiples of
-      // n, which the normalisation of the normal takes out again. h = (wo + wi) · inverse_h.
-      const float along_h =
-          by_specular * 4.0f * n_h * one_minus_alpha2 * inverse_base * step[kInverseH * kWidth + k];
+      // d ln(specular) / dn = d ln D / d n·h · h + (masking terms) wo, wi + wi / n·wi, up to multiples of n,
+      // which the normalisation of the normal takes out again. h is wo + wi, normalised.
+      const float along_h = by_specular * step[kAlongH * kWidth + k];
       const float safe_n_i = n_i > 1e-6f ? n_i : 1e-6f;
       const float along_wi = along_h +
                              by_specular * (1.0f / safe_n_i - visibility - masking * one_minus_alpha2 * n_i) +
@@ -220,7 +234,6 @@ vec3 Shader::shade(const CacheSample& sample, const Shading& shading, std::span<
   sample_ = &sample;
   shading_ = &shading;
   lights_ = lights;
-  if (!sample.hit) return vec3(0.0f);
   if (model_ != render::BsdfModel::kGltf)
     return shade_reference(model_, sample, shading, lights, vec3(0.0f)).radiance;
   const PointTerms t = point_terms(sample, shading);
@@ -232,7 +245,6 @@ vec3 Shader::shade(const CacheSample& sample, const Shading& shading, std::span<
 }
 
 MapGradient Shader::adjoint(const vec3& d_radiance) const {
-  if (!sample_->hit) return zero_gradient();
   if (model_ != render::BsdfModel::kGltf)
     return shade_reference(model_, *sample_, *shading_, lights_, d_radiance).gradient;
   const PointTerms t = point_terms(*sample_, *shading_);
@@ -248,7 +260,6 @@ MapGradient Shader::adjoint(const vec3& d_radiance) const {
 ShadeResult shade_reference(render::BsdfModel model, const CacheSample& sample, const Shading& shading,
                             std::span<const PackedLight> lights, const vec3& d_radiance) {
   ShadeResult result{vec3(0.0f), zero_gradient()};
-  if (!sample.hit) return result;
   result.radiance = sample.emission;
   vec3 d_base_color(0.0f), d_normal(0.0f);
   float d_roughness = 0, d_metallic = 0;

@@ -16,7 +16,8 @@ class Shader {
  public:
   explicit Shader(render::BsdfModel model) : model_(model) {}
 
-  /// Radiance that a sample sends to the eye, [3] linear: emission and reflection. The arguments must live
+  /// Radiance that a sample sends to the eye, [3] linear: emission and reflection. `extent`: of each light,
+  /// what its extent adds to α² of the GGX lobe (light_bins.h; glTF model only). The arguments must live
   /// until the next call.
   vec3 shade(const CacheSample& sample, const Shading& shading, std::span<const PackedLight> lights);
 
@@ -32,7 +33,7 @@ class Shader {
   vec3 sum_by_base_color_{0.0f};  // derivative of the radiance with respect to base colour
 };
 
-/// Value and gradient by the plain way, for any model.
+/// Value and gradient by the plain way, for any model and lights without extent.
 struct ShadeResult {
   vec3 radiance{0.0f};
   MapGradient gradient;

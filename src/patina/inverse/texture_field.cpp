@@ -30,8 +30,7 @@ Taps taps_between(const asset::Map& map, const Image& fine, const Image& coarse)
           upsample_taps(fine.height, coarse.height, map.wrap_t)};
 }
 
-constexpr int64_t kRowsPerTask = 16;
-constexpr int64_t kNumbersPerTask = 1 << 15;
+constexpr int64_t kRowsPerTask = 16, kTexelsPerTask = 1 << 14;
 
 // fine += upsampled coarse.
 void add_upsampled(const asset::Map& map, const Image& coarse, Image& fine) {
@@ -109,83 +108,62 @@ TextureField make_field(const asset::Map& map, int width, int height, int channe
     field.levels.emplace_back(w, h, channels);
     if (std::max(w, h) <= kCoarsestSide) break;
   }
-  field.first_moment = field.levels;
-  field.second_moment = field.levels;
-  field.num_steps.assign(field.levels.size(), 0);
+  field.levels.emplace_back(KindShares::kNumKinds, 1, channels);
   return field;
 }
 
-void compose(TextureField& field) {
-  Image sum = field.levels.back();
-  for (size_t level = field.levels.size() - 1; level-- > 0;) {
-    Image finer = field.levels[level];
+Image composed(const TextureField& field, std::span<const Image> levels) {
+  const Image& of_kinds = levels.back();
+  Image sum = levels[levels.size() - 2];
+  for (size_t level = levels.size() - 2; level-- > 0;) {
+    Image finer = levels[level];
     add_upsampled(field.delta, sum, finer);
     sum = std::move(finer);
   }
-  field.delta.texels = std::move(sum);
+  const auto channels = static_cast<size_t>(sum.channels);
+  parallel_for(0, static_cast<int64_t>(field.kinds.texels.size()), kTexelsPerTask,
+               [&](int64_t begin, int64_t end) {
+                 for (auto t = static_cast<size_t>(begin); t < static_cast<size_t>(end); ++t)
+                   for (const auto& [kind, share] : field.kinds.texels[t])
+                     for (size_t c = 0; c < channels; ++c)
+                       sum.pixels[t * channels + c] += share * of_kinds.pixels[kind * channels + c];
+               });
+  return sum;
 }
 
-std::vector<Image> restrict_to_levels(const TextureField& field, const Image& d_delta) {
+void compose(TextureField& field) {
+  field.delta.texels = composed(field, field.levels);
+}
+
+std::vector<Image> restrict_to_levels(const TextureField& field, Image d_delta) {
+  const int num_channels = d_delta.channels;
   std::vector<Image> gradients;
-  gradients.push_back(d_delta);
-  for (size_t level = 1; level < field.levels.size(); ++level) {
-    Image coarse(field.levels[level].width, field.levels[level].height, d_delta.channels);
+  gradients.push_back(std::move(d_delta));
+  for (size_t level = 1; level + 1 < field.levels.size(); ++level) {
+    Image coarse(field.levels[level].width, field.levels[level].height, num_channels);
     add_restricted(field.delta, gradients.back(), coarse);
     gradients.push_back(std::move(coarse));
   }
-  return gradients;
-}
-
-void adam_step(TextureField& field, const std::vector<Image>& gradients, int finest,
-               const AdamOptions& options) {
-  PATINA_CHECK_EQ(gradients.size(), field.levels.size());
-  for (size_t level = static_cast<size_t>(finest); level < field.levels.size(); ++level) {
-    const std::vector<float>& gradient = gradients[level].pixels;
-    std::vector<float>& m = field.first_moment[level].pixels;
-    std::vector<float>& v = field.second_moment[level].pixels;
-    std::vector<float>& x = field.levels[level].pixels;
-    const auto step = static_cast<float>(++field.num_steps[level]);
-    const float m_scale = 1.0f / (1.0f - std::pow(options.beta1, step));
-    const float v_scale = 1.0f / (1.0f - std::pow(options.beta2, step));
-    // Only texels that ever had a gradient count for the mean: most of a level may lie between the islands.
-    // Sums go by blocks of one size, whatever the number of threads.
-    struct BlockSum {
-      double v = 0;
-      size_t num_reached = 0;
-    };
-    const auto count = static_cast<int64_t>(x.size());
-    const int64_t num_blocks = (count + kNumbersPerTask - 1) / kNumbersPerTask;
-    std::vector<BlockSum> sums(static_cast<size_t>(num_blocks));
-    const auto block_range = [&](int64_t block) {
-      return std::pair(static_cast<size_t>(block * kNumbersPerTask),
-                       static_cast<size_t>(std::min(count, (block + 1) * kNumbersPerTask)));
-    };
-    parallel_for(0, num_blocks, 1, [&](int64_t begin, int64_t end) {
-      for (int64_t block = begin; block < end; ++block) {
-        const auto [first, last] = block_range(block);
-        BlockSum sum;
-        for (size_t i = first; i < last; ++i) {
-          m[i] = options.beta1 * m[i] + (1.0f - options.beta1) * gradient[i];
-          v[i] = options.beta2 * v[i] + (1.0f - options.beta2) * gradient[i] * gradient[i];
-          sum.v += v[i];
-          sum.num_reached += v[i] > 0.0f;
-        }
-        sums[static_cast<size_t>(block)] = sum;
-      }
-    });
-    BlockSum total;
-    for (const BlockSum& sum : sums) total.v += sum.v, total.num_reached += sum.num_reached;
-    if (total.num_reached == 0) continue;
-    const float rms =
-        std::sqrt(v_scale * static_cast<float>(total.v / static_cast<double>(total.num_reached)));
-    const float epsilon = options.relative_epsilon * rms + 1e-20f;
-    parallel_for(0, num_blocks, 1, [&](int64_t begin, int64_t end) {
-      const size_t first = block_range(begin).first, last = block_range(end - 1).second;
-      for (size_t i = first; i < last; ++i)
-        x[i] -= options.learning_rate * m_scale * m[i] / (std::sqrt(v_scale * v[i]) + epsilon);
-    });
+  // In double and block by block, in order: millions may belong to one kind.
+  const auto channels = static_cast<size_t>(num_channels);
+  const size_t num_texels = field.kinds.texels.size(), num_sums = KindShares::kNumKinds * channels,
+               block_size = size_t{kTexelsPerTask}, num_blocks = (num_texels + block_size - 1) / block_size;
+  std::vector<double> sums(num_blocks * num_sums);
+  parallel_for(0, static_cast<int64_t>(num_blocks), 1, [&](int64_t begin, int64_t end) {
+    for (auto block = static_cast<size_t>(begin); block < static_cast<size_t>(end); ++block)
+      for (size_t t = block * block_size; t < std::min(num_texels, (block + 1) * block_size); ++t)
+        for (const auto& [kind, share] : field.kinds.texels[t])
+          for (size_t c = 0; c < channels; ++c)
+            sums[block * num_sums + kind * channels + c] +=
+                double{share} * gradients[0].pixels[t * channels + c];
+  });
+  gradients.emplace_back(KindShares::kNumKinds, 1, num_channels);
+  for (size_t i = 0; i < num_sums; ++i) {
+    double sum = 0;
+    for (size_t block = 0; block < num_blocks; ++block) sum += sums[block * num_sums + i];
+    gradients.back().pixels[i] = static_cast<float>(sum);
   }
-  compose(field);
+  return gradients;
 }
 
 }  // namespace patina::inverse

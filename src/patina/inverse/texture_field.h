@@ -1,9 +1,13 @@
-// The change of one map, as a sum of a coarse-to-fine pyramid of textures, and its Adam state. Levels near
-// the resolution of the views learn detail, coarse ones carry it over texels that no pixel centre met, so
-// that no speckle is left between them; levels finer than what the views resolve do not exist, so the
-// original's finest detail stays under the change.
+// The change of one map, as a sum of a coarse-to-fine pyramid of textures and of one value for each kind of
+// material. Levels near the resolution of the views learn detail, coarse ones carry it over texels that no
+// pixel centre met, so that no speckle is left between them; levels finer than what the views resolve do not
+// exist, so the original's finest detail stays under the change. Kinds (material_kinds.h) carry what all
+// texels of one look have in common.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "patina/asset/material_maps.h"
@@ -18,32 +22,35 @@ struct UpsampleTap {
   float weight_b;
 };
 
+/// The kinds to which a texel belongs most and how much it does; their shares add up to one, or are all zero
+/// where no view says anything.
+struct KindShares {
+  static constexpr int kNumKinds = 12;  // at most, of one material
+  static constexpr size_t kPerTexel = 3;
+  struct Share {
+    uint16_t kind = 0;
+    float share = 0;
+  };
+  std::vector<std::array<Share, kPerTexel>> texels;  // empty: the map does not follow kinds
+};
+
 struct TextureField {
-  asset::Map delta;           // [h,w,C] composed change; the map's UV set, transform and wrap modes
-  std::vector<Image> levels;  // finest (size of delta) first; delta = sum of all, upsampled
-  std::vector<Image> first_moment, second_moment;  // Adam, per level
-  std::vector<int> num_steps;                      // Adam steps per level
+  asset::Map delta;  // [h,w,C] composed change; the map's UV set, transform and wrap modes
+  // Finest (size of delta) first, the last holds the values of the kinds [1,kNumKinds,C]; delta = the sum of
+  // all, upsampled, and of each texel's kinds.
+  std::vector<Image> levels;
+  KindShares kinds;
 };
 
 /// A zero field of width × height texels for `map`, with levels down to about eight texels a side.
 TextureField make_field(const asset::Map& map, int width, int height, int channels);
 
+/// The change that `levels`, laid out as those of `field`, add up to.
+Image composed(const TextureField& field, std::span<const Image> levels);
 /// Sums the levels into delta.
 void compose(TextureField& field);
 
 /// The adjoint of compose: the gradient with respect to every level from that with respect to delta.
-std::vector<Image> restrict_to_levels(const TextureField& field, const Image& d_delta);
-
-struct AdamOptions {
-  float learning_rate = 0.02f;
-  float beta1 = 0.9f, beta2 = 0.98f;
-  /// Added to √v, as a share of its root mean square over the level: texels that hardly any pixel sees then
-  /// move in proportion to their gradient instead of at full speed.
-  float relative_epsilon = 0.1f;
-};
-
-/// One step of Adam [Kingma2015] on levels `finest` and coarser; composes afterwards.
-void adam_step(TextureField& field, const std::vector<Image>& gradients, int finest,
-               const AdamOptions& options);
+std::vector<Image> restrict_to_levels(const TextureField& field, Image d_delta);
 
 }  // namespace patina::inverse

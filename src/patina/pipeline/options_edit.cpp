@@ -33,8 +33,8 @@ Option preset_option() {
   const About about{
       .name = "preset",
       .help =
-          "fast: 4 views, 12 steps, 80 iterations of the fit, no turntable; to try prompts. quality: 16 "
-          "views, 30 steps, 400 iterations, smoother renders. Options given beside it win."};
+          "fast: 4 views, 12 steps, 8 iterations of the fit, no turntable; to try prompts. quality: 16 "
+          "views, 30 steps, 32 iterations of the fit, smoother renders. Options given beside it win."};
   Option option = described(about, "Edit", kEverything, presets);
   option.default_text = "usual";
   option.set = [named = option, presets](Config& c, const json& value) {
@@ -46,7 +46,7 @@ Option preset_option() {
     c.inputs.orbit.num_views = fast ? 4 : 16;
     c.edit.options.num_steps = fast ? 12 : 30;
     c.render.samples_per_pixel = c.report.samples_per_pixel = fast ? 32 : 128;
-    c.fit.options.iterations = fast ? 80 : 400;
+    c.fit.options.iterations = fast ? 8 : 32;
     c.report.turntable_frames = fast ? 0 : 36;
   };
   option.get = [presets](const Config& c) { return presets.encode(c.preset); };

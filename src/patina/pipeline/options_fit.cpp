@@ -17,7 +17,7 @@ Option fitted_maps() {
   Option made = described(About{.name = "fit",
                                 .placeholder = "MAP",
                                 .help = "Which maps may change: base_color, roughness, metallic, normal.",
-                                .default_text = "base_color roughness normal"},
+                                .default_text = "base_color roughness metallic normal"},
                           kGroup, kFit, text());
   made.is_list = made.splits_at_commas = true;
   made.expected.clear();
@@ -75,13 +75,11 @@ std::vector<Option> fit_options() {
           [](auto& s) -> auto& { return s.options.texture_size; }),
       fitted_maps(),
       option(
-          at, {.name = "fit-rate", .placeholder = "X", .help = "Learning rate of the optimiser (Adam)."},
-          number(1e-5f, 1.0f), [](auto& s) -> auto& { return s.options.learning_rate; }),
-      option(
           at,
           {.name = "light-samples",
            .placeholder = "N",
-           .help = "Directions of incident light that are kept for every pixel."},
+           .help =
+               "Directions of incident light that are traced from each of four to eight points of a pixel."},
           integer(4, 1024), [](auto& s) -> auto& { return s.options.light_samples; }),
       boundary(),
       option(

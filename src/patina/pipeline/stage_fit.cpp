@@ -70,6 +70,7 @@ std::string fit_key(const Workbench& bench, const Strength& strength, const Rend
       .add_materials(strength.enhanced)
       .add_strength(strength)
       .add(views.set.exposure_ev)
+      .add(views.tile)
       .add(edited)
       .hash();
 }
@@ -108,9 +109,9 @@ FittedMaterials fit_stage(const Workbench& bench, const Strength& strength, cons
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
       (void)write_maps(so_far.maps, so_far.changed, run, kPreviewFolder);
     };
-    const inverse::FitResult fitted =
-        inverse::fit_materials(*bench.scene, {views.set, edited, strength.enhanced, strength.maps},
-                               settings.options, hooks, progress);
+    const inverse::FitResult fitted = inverse::fit_materials(
+        *bench.scene, {views.set, edited, strength.enhanced, strength.maps, views.tile}, settings.options,
+        hooks, progress);
 
     RunFolder::StageResult result;
     WrittenMaps written = write_maps(fitted.maps, fitted.changed, run, kFolder);

@@ -75,10 +75,10 @@ void visit(const diffusion::EditOptions& s, Visitor& visitor) {
 }
 template <class Visitor>
 void visit(const inverse::FitOptions& s, Visitor& visitor) {
-  const auto& [iterations, texture_size, maps, learning_rate, light_samples, max_depth, boundary_pixels,
-               fill_unseen, keep_in_place, seed] = s;
-  visitor(iterations, texture_size, maps, learning_rate, light_samples, max_depth, boundary_pixels,
-          fill_unseen, keep_in_place, seed);
+  const auto& [iterations, texture_size, maps, light_samples, max_depth, boundary_pixels, fill_unseen,
+               keep_in_place, seed] = s;
+  visitor(iterations, texture_size, maps, light_samples, max_depth, boundary_pixels, fill_unseen,
+          keep_in_place, seed);
 }
 template <class Visitor>
 void visit(const RenderSettings& s, Visitor& visitor) {
