@@ -57,7 +57,7 @@ int exit_code_of(ErrorCode code) {
 std::unique_ptr<CLI::App> make_program() {
   auto program = std::make_unique<CLI::App>(
       "patina adds generated detail (rust, moss, wear, dust, age) to the material of an existing 3D asset.\n"
-      "Mesh, UVs and file structure stay; base colour, normal and roughness textures change.\n\n"
+      "Mesh, UVs and file structure stay; base colour, metallic, roughness and normal textures change.\n\n"
       "  patina enhance kettle.glb --prompt \"a rusty old kettle\" --model DIR -o rusty.glb",
       "patina");
   program->require_subcommand(1);

@@ -1,5 +1,5 @@
-// Inverse rendering: finds base colour, roughness and normal maps whose renders look like the edited views
-// [Hadadan2025, Sec. 4 and 5].
+// Inverse rendering: finds base colour, roughness, metallic and normal maps whose renders look like the
+// edited views [Hadadan2025, Sec. 4 and 5].
 #pragma once
 
 #include <span>
