@@ -2,6 +2,7 @@
 // be killed and continued.
 #include "patina/pipeline/ablate.h"
 
+#include <algorithm>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -156,13 +157,22 @@ class AblateEdits : public testing::Test {
 TEST_F(AblateEdits, a_killed_one_continues_and_gives_the_same_numbers) {
   const fs::path broken = folder_->path() / "broken";
   // How long the whole takes depends on what else the machine does: one that ended before it was killed is
-  // started anew and killed sooner.
-  for (double share = 0.75; share > 0.02; share *= 0.7) {
+  // started anew and killed sooner, one that had not begun later.
+  bool was_killed = false;
+  double begun = 0, ended = 1;  // shares of the time that are too early and too late
+  for (int attempt = 0; attempt < 12 && !was_killed; ++attempt) {
+    const double share = attempt == 0 ? 0.75 : 0.5 * (begun + ended);
     const auto result = test::run_process(ablate_command(broken, kOptions), {.kill_after = share * seconds_});
-    if (result.signal != 0) break;
-    fs::remove_all(broken);
+    was_killed = result.signal != 0 && fs::exists(broken);
+    if (result.signal == 0) {
+      ended = share;
+      fs::remove_all(broken);
+    } else if (!was_killed) {
+      begun = share;
+      ended = std::max(ended, 2 * share);
+    }
   }
-  ASSERT_TRUE(fs::exists(broken)) << "never killed";
+  ASSERT_TRUE(was_killed);
   run_ok(ablate_command(broken, kOptions));
   EXPECT_EQ(without_cost(numbers_of(broken).at("steps")), without_cost(numbers_of(whole()).at("steps")));
 }
