@@ -10,7 +10,7 @@
 // Part `aged` (aged.h): fits from clean assets to aged ones, judged under other light as well.
 //
 //   bench_inverse [--part known|aged] [--shared ../shared] [--resolution 512] [--samples 128]
-//                 [--iterations 200] [--only NAME]
+//                 [--iterations 24] [--only NAME]
 //                 [--out build/bench/inverse.json] [--pictures build/bench/inverse]
 #include <chrono>
 #include <cmath>

@@ -263,6 +263,7 @@ TEST(light_cache, gradients_of_a_real_asset_agree_texel_by_texel) {
   }
   const float gain = std::exp2(views.exposure_ev);
   inverse::Evaluator evaluator(fitted, seen, scene.bsdf_model(), gain);
+  for (inverse::CachePixel& pixel : cache.pixels) pixel.calibration = {0.8f, 1.0f, 1.3f};
   evaluator.evaluate(cache);
 
   // What Gauss-Newton takes for the gradient: residuals' scales stay where they are (PixelResidual).
@@ -274,7 +275,7 @@ TEST(light_cache, gradients_of_a_real_asset_agree_texel_by_texel) {
       const inverse::CachePixel& pixel = cache.pixels[i];
       vec3 now(0.0f);
       for (size_t s = cache.first_sample[i]; s < cache.first_sample[i + 1]; ++s)
-        now += cache.samples[s].share * of_samples[s];
+        now += cache.samples[s].share * pixel.calibration * of_samples[s];
       for (int c = 0; c < 3; ++c) {
         const double reference = std::max(reinhard(gain * start[i][c]), pixel.target[c]);
         sum += pixel.weight * square(double{reinhard(gain * now[c])} - pixel.target[c]) /

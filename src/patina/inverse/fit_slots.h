@@ -1,4 +1,5 @@
-// How each map is fitted: its prior, when it joins, how fast it moves. One row a slot of asset/map_slots.h.
+// How each map is fitted: its prior, when it joins, whether it follows kinds. One row a slot of
+// asset/map_slots.h.
 #pragma once
 
 #include <array>

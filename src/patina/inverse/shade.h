@@ -16,9 +16,9 @@ class Shader {
  public:
   explicit Shader(render::BsdfModel model) : model_(model) {}
 
-  /// Radiance that a sample sends to the eye, [3] linear: emission and reflection. `extent`: of each light,
-  /// what its extent adds to α² of the GGX lobe (light_bins.h; glTF model only). The arguments must live
-  /// until the next call.
+  /// Radiance that a sample sends to the eye, [3] linear: emission and reflection. A sample whose
+  /// normal turns (CacheSample::extent) reflects the mean of the GGX lobes over it (glTF model only). The
+  /// arguments must live until the next call.
   vec3 shade(const CacheSample& sample, const Shading& shading, std::span<const PackedLight> lights);
 
   /// Gradient of dot(d_radiance, radiance of the sample shaded last) with respect to the map values.
@@ -33,7 +33,7 @@ class Shader {
   vec3 sum_by_base_color_{0.0f};  // derivative of the radiance with respect to base colour
 };
 
-/// Value and gradient by the plain way, for any model and lights without extent.
+/// Value and gradient by the plain way, for any model; as if the normal did not turn within the sample.
 struct ShadeResult {
   vec3 radiance{0.0f};
   MapGradient gradient;
