@@ -91,8 +91,9 @@ void add_ablate(CLI::App& program) {
                  "takes longer.")
       ->group("Comparison");
   const auto point = add_point_options(*command, "Comparison");
-  const auto given = add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.", pipeline::kEverything,
-                                 {"output", "run", "turntable", "views", "noise", "bias", "bias-scaling"});
+  const auto given =
+      add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.", pipeline::kEverything,
+                  {"output", "run", "turntable", "views", "seeds", "noise", "bias", "bias-scaling"});
   command->callback([=] {
     find_positional(*given);
     pipeline::Config config;

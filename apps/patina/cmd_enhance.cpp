@@ -8,6 +8,7 @@
 #include "patina/nn/threads.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/options.h"
+#include "patina/pipeline/variants.h"
 
 namespace patina::app {
 
@@ -28,6 +29,7 @@ void add_enhance(CLI::App& program) {
     Console console(given->style());
     pipeline::RunFolder run(pipeline::run_folder_path(config));
     pipeline::enhance(config, run, console.progress());
+    if (pipeline::only_edits(config)) return console.result({{"edits", pipeline::variants_page(run)}});
     console.result({{"asset", config.output}, {"report", run.file("report.html")}});
   });
 }

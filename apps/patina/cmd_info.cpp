@@ -13,7 +13,13 @@ void add_info(CLI::App& program) {
   command->add_option("FILE", *path, ".glb .gltf .obj .png .jpg .hdr .exr .safetensors")
       ->required()
       ->type_name("");
-  command->callback([=] { fmt::print("{}", pipeline::describe_file(*path)); });
+  auto prompts = std::make_shared<bool>(false);
+  command->add_flag("--prompts", *prompts,
+                    "Print a configuration file with a line for the words of each material instead, to be "
+                    "filled in: patina info ASSET --prompts > prompts.toml");
+  command->callback([=] {
+    fmt::print("{}", *prompts ? pipeline::prompts_to_fill_in(*path) : pipeline::describe_file(*path));
+  });
 }
 
 }  // namespace patina::app

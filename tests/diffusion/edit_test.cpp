@@ -71,6 +71,29 @@ TEST(Detail, without_bias_it_is_the_reference_controlnet_image_to_image) {
   EXPECT_LT(max_difference(views[0], image_of(golden, "decoded_01")), 5e-4 + 1e-4);
 }
 
+TEST(Detail, parts_with_the_prompt_s_own_words_change_nothing_and_others_do) {
+  EditInputs inputs = made_inputs(2, 64);
+  EditOptions options = short_options();
+  options.negative_prompt = "clean";
+  const std::vector<Image> plain = run(inputs, options);
+  for (size_t v = 0; v < inputs.tile_views.size(); ++v) {
+    Image halves(64, 64, 2, 0.0f);
+    for (int y = 0; y < 64; ++y)
+      for (int x = 0; x < 64; ++x) halves.at(x, y)[y < 20 ? 0 : 1] = x < 40 ? 1.0f : 0.25f;
+    inputs.part_views.push_back(halves);
+  }
+  options.part_prompts = {{options.prompt}, {options.prompt, "clean"}};
+  const std::vector<Image> same = run(inputs, options);
+  for (size_t v = 0; v < plain.size(); ++v) EXPECT_LT(max_difference(plain[v], same[v]), 1e-3);
+  options.part_prompts[1].prompt = "a wooden box under green moss, (snow:1.3)";
+  EXPECT_GT(max_difference(plain[0], run(inputs, options)[0]), 1e-2);
+  options.part_prompts[1] = {options.prompt, "a wooden box"};
+  EXPECT_GT(max_difference(plain[0], run(inputs, options)[0]), 1e-2);
+
+  inputs.part_views.pop_back();
+  EXPECT_THROW(run(inputs, options), Error);
+}
+
 TEST(Detail, a_resumed_run_gives_the_same_bytes) {
   const EditInputs inputs = made_inputs(2, 64);
   for (const Scheduler scheduler : {Scheduler::kUniPc, Scheduler::kPndm, Scheduler::kEulerAncestral}) {

@@ -21,6 +21,8 @@ inline const std::vector<OptionCase> kOptionCases{
     {"preset", {"fast"}, kAll},
     {"prompt", {"a mossy kettle"}, kFromEdit},
     {"negative-prompt", {"shiny"}, kFromEdit},
+    {"prompt-for", {"enamel=moss"}, kFromEdit},
+    {"negative-prompt-for", {"enamel=shiny"}, kFromEdit},
     {"strength", {"1"}, kFromEdit},
     {"guidance-scale", {"3"}, kFromEdit},
     {"steps", {"4"}, kFromEdit},
@@ -31,6 +33,7 @@ inline const std::vector<OptionCase> kOptionCases{
 
     {"mask", {"FILE:mask.png"}, kFromEdit},
     {"mask-vertex-color", {"true"}, kFromEdit},
+    {"strength-for", {"enamel=0.5"}, kFromEdit},
     {"protect", {"enamel"}, kFromEdit},
     {"where", {"up:0.5"}, kFromEdit},
 
@@ -84,6 +87,8 @@ inline const std::vector<OptionCase> kOptionCases{
     {"keep-in-place", {"true"}, "fit"},  // one iteration moves no view yet
 
     {"seed", {"9"}, kAll},
+    {"edit-seed", {"3"}, kFromEdit},
+    {"seeds", {"2"}, "detail"},
     {"threads", {"1"}, ""},
 };
 

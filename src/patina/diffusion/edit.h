@@ -25,6 +25,8 @@ struct EditInputs {
   std::vector<Image> strength_views = {};  // grid² × [H,W,1] [0,1]: share of EditOptions::strength with which
                                            // a place is edited, 0: not at all, below 0: shows nothing that
                                            // has a strength (late_join.h); empty: 1 everywhere
+  std::vector<Image> part_views = {};  // grid² × [H,W,parts] [0,1]: how much of each pixel shows each part
+                                       // of EditOptions::part_prompts; the rest follows the prompt
 };
 
 /// Where a run stands between two steps, as bytes that restore it exactly; for resuming a killed run.

@@ -70,6 +70,8 @@ GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const Edit
     check_views(inputs.*kind.views, std::string(kind.name) + " views", sizes);
   if (!inputs.start_views.empty()) check_views(inputs.start_views, "start views", sizes);
   if (!inputs.strength_views.empty()) check_views(inputs.strength_views, "strength views", sizes, 1);
+  if (!options.part_prompts.empty())
+    check_views(inputs.part_views, "part views", sizes, static_cast<int>(options.part_prompts.size()));
   const int64_t noise_size =
       model.latent_channels() * sizes.grid * sizes.grid * sizes.latent_height * sizes.latent_width;
   if (static_cast<int64_t>(inputs.noise.size()) != noise_size) {
@@ -123,6 +125,27 @@ std::vector<float> start_latents(const Vae& vae, const std::vector<Image>& views
   return {tiled.data_ptr<float>(), tiled.data_ptr<float>() + tiled.numel()};
 }
 
+/// The negative one first where there is guidance, through all text encoders.
+TextConditioning encode_texts(const Model::State& networks, const std::string& prompt,
+                              const Guidance& guidance, int clip_skip) {
+  std::vector<std::string> prompts{prompt};
+  if (guidance.scale != 1) prompts.insert(prompts.begin(), guidance.negative_prompt);
+  std::vector<TextConditioning> texts;
+  for (const TextStage& text : networks.texts)
+    texts.push_back(encode_prompts(text.tokenizer, *text.encoder.use(), text.words, prompts, clip_skip));
+  return join_encoders(texts);
+}
+
+/// The parts' shares [parts + 1,H,W] of the grid's latent pixels, before them what is left for the prompt.
+at::Tensor latent_shares(const std::vector<Image>& part_views, const GridSizes& sizes) {
+  std::vector<at::Tensor> tensors;
+  for (const Image& view : part_views)
+    tensors.push_back(
+        at::adaptive_avg_pool2d(tensor_from_image(view), {sizes.latent_height, sizes.latent_width}));
+  const at::Tensor parts = tile(tensors, sizes.grid).squeeze(0);
+  return at::cat({at::clamp_min(1 - parts.sum(0, /*keepdim=*/true), 0), parts});
+}
+
 }  // namespace
 
 at::Tensor tensor_from_image(const Image& image) {
@@ -169,13 +192,16 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
 
   // What stays the same over all steps.
   run->bias = {inputs.bias_levels, options.bias_weight, options.bias_scaling == BiasScaling::kPaper};
-  std::vector<std::string> prompts{options.prompt};
   const Guidance guidance = guidance_of(model, options);
-  if (guidance.scale != 1) prompts.insert(prompts.begin(), guidance.negative_prompt);
-  std::vector<TextConditioning> texts;
-  for (const TextStage& text : networks.texts)
-    texts.push_back(
-        encode_prompts(text.tokenizer, *text.encoder.use(), text.words, prompts, options.clip_skip));
+  const TextConditioning text = encode_texts(networks, options.prompt, guidance, options.clip_skip);
+  std::vector<TextConditioning> part_texts;
+  for (const PartPrompt& part : options.part_prompts)
+    part_texts.push_back(encode_texts(
+        networks, part.prompt, {guidance.scale, part.negative_prompt.value_or(guidance.negative_prompt)},
+        options.clip_skip));
+  std::optional<PartLevels> part_levels;
+  if (!part_texts.empty())
+    part_levels.emplace(latent_shares(inputs.part_views, sizes), networks.unet.config().levels.size());
   std::vector<Control> controls;
   for (size_t i = 0; i < kControlKinds.size(); ++i) {
     const Held<ControlNet>& network = networks.controlnets[i];
@@ -184,7 +210,9 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
   }
   run->denoiser = {&networks.unet,
                    std::move(controls),
-                   join_encoders(texts),
+                   text,
+                   std::move(part_texts),
+                   std::move(part_levels),
                    guidance.scale,
                    guides_in_one_batch(networks.unet.config(), run->shape[2] * run->shape[3]),
                    &run->bias,

@@ -50,13 +50,21 @@ struct Guidance {
   std::string negative_prompt = {};
 };
 
+/// Words for one part of the picture, in place of the prompt.
+struct PartPrompt {
+  std::string prompt;
+  std::optional<std::string> negative_prompt = std::nullopt;  // nullopt: that of the whole picture
+  bool operator==(const PartPrompt&) const = default;
+};
+
 /// EditOptions::guidance_scale: the model's own, 7.5 where it names none.
 inline constexpr float kAutoGuidanceScale = 0;
 
 struct EditOptions {
   std::string prompt = {};                                    // with weights as prompt.h reads it
   std::optional<std::string> negative_prompt = std::nullopt;  // nullopt: the model's own, most often none
-  int clip_skip = 1;  // 1: the whole text encoder; n leaves out its last n - 1 layers
+  std::vector<PartPrompt> part_prompts = {};  // of the parts that EditInputs::part_views shows
+  int clip_skip = 1;                          // 1: the whole text encoder; n leaves out its last n - 1 layers
   int num_steps = 20;
   float guidance_scale = kAutoGuidanceScale;  // 1: no guidance, one evaluation a step
   float strength = 1.0f;                      // (0,1]: share of the steps that is run [Meng2022]

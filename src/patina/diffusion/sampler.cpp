@@ -26,6 +26,11 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
   for (TextConditioning& prompts : split_prompts(text, one_batch ? 2 : 1)) {
     const at::Tensor samples = latents.expand({prompts.tokens.size(0), -1, -1, -1});
     evaluations.push_back({samples, timesteps, std::move(prompts), bias});
+    evaluations.back().part_levels = part_levels ? &*part_levels : nullptr;
+  }
+  for (const TextConditioning& part : part_texts) {
+    const std::vector<TextConditioning> groups = split_prompts(part, one_batch ? 2 : 1);
+    for (size_t i = 0; i < evaluations.size(); ++i) evaluations[i].part_texts.push_back(groups[i]);
   }
 
   // ControlNets outside: with little memory each is read from its file for this loop.

@@ -13,7 +13,7 @@
 namespace patina::pipeline {
 
 /// What --preset chose; its values are written into the other fields.
-enum class Preset { kUsual, kFast, kQuality };
+enum class Preset { kUsual, kDraft, kFast, kQuality };
 
 /// What every stage works on: files, and the cameras. Read anew by every command (workbench.h); stages have
 /// the content in their keys.
@@ -33,6 +33,8 @@ struct Config {
   float blend = 1.0f;            // share of the new textures in the output (blend.h)
   std::filesystem::path run;     // empty: beside the output, <output stem>.patina-run
   bool keep = false;             // what was changed by hand in the run folder stays when its stage runs again
+
+  int num_seeds = 1;  // above 1: so many edits, and nothing beyond (variants.h)
 
   InputSettings inputs;
   MaskSettings masks;

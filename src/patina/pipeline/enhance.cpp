@@ -11,6 +11,8 @@
 #include "patina/diffusion/model.h"
 #include "patina/pipeline/blend.h"
 #include "patina/pipeline/options.h"
+#include "patina/pipeline/part_prompts.h"
+#include "patina/pipeline/variants.h"
 
 namespace patina::pipeline {
 
@@ -34,8 +36,10 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
   check_export(bench, config.output, progress);
-  const Strength strength = mask_stage(bench, config.masks, run, progress);       // → masks/
+  const Strength strength = mask_stage(bench, config.masks, run, progress);  // → masks/
+  part_prompts(bench, strength, config.edit);  // refuses what is wrong with them before anything is rendered
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
+  if (only_edits(config)) return edit_variants(bench, strength, views, config, model, run, progress);
   const std::vector<Image> edited =
       edit_stage(bench, strength, views, config.edit, model, run, progress);  // → detail/
   model.unload();
@@ -61,7 +65,9 @@ void run_edit(Config config, RunFolder& run, const RunProgress& progress) {
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);
   const Strength strength = mask_stage(bench, config.masks, run, progress);
-  edit_stage(bench, strength, load_views(bench, run), config.edit, model, run, progress);
+  const RenderedViews views = load_views(bench, run);
+  if (config.num_seeds > 1) return edit_variants(bench, strength, views, config, model, run, progress);
+  edit_stage(bench, strength, views, config.edit, model, run, progress);
 }
 
 void run_fit(Config config, RunFolder& run, const RunProgress& progress) {
@@ -152,7 +158,7 @@ Config read_config(const fs::path& run_folder) {
                 fmt::format("is not a patina configuration: {}", e.what()));
   }
   config.run = run_folder;
-  config.keep = false;  // asked for anew each time
+  config.keep = false, config.num_seeds = 1;  // asked for anew each time
   return config;
 }
 

@@ -1,9 +1,10 @@
 #include "patina/pipeline/info.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <map>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "patina/asset/asset.h"
 #include "patina/asset/material_maps.h"
@@ -140,6 +141,23 @@ std::string describe_weights(const fs::path& path) {
 }
 
 }  // namespace
+
+std::string prompts_to_fill_in(const fs::path& path) {
+  const asset::Asset asset = asset::read_asset(path);
+  asset::require_enhanceable(asset);
+  std::string text = fmt::format(
+      "# What {} should look like. Fill in, then:\n"
+      "#   patina enhance ASSET --config THIS_FILE -o OUT.glb\n"
+      "prompt = \"\"  # for all materials without words of their own\n"
+      "prompt-for = [  # materials without words follow the prompt\n",
+      printable(path.filename().string()));
+  std::vector<bool> used(asset.materials.size(), false);
+  for (const asset::Primitive& primitive : asset.primitives)
+    used[static_cast<size_t>(primitive.material)] = true;
+  for (size_t m = 0; m < used.size(); ++m)
+    if (used[m]) text += "  " + nlohmann::json(printable(asset.materials[m].name) + "=").dump() + ",\n";
+  return text + "]\n";
+}
 
 std::string describe_file(const fs::path& path) {
   const std::string extension = lowered(path.extension().string());

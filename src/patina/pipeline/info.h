@@ -11,4 +11,8 @@ namespace patina::pipeline {
 /// anything else is Error{kUnsupported}.
 std::string describe_file(const std::filesystem::path& path);
 
+/// A configuration file (TOML) with a line for the words of each material of an asset, to be filled in and
+/// given back with --config. Throws Error.
+std::string prompts_to_fill_in(const std::filesystem::path& asset);
+
 }  // namespace patina::pipeline

@@ -24,17 +24,30 @@ Kind<Scheduler> scheduler() {
                             {"unipc", Scheduler::kUniPc}});
 }
 
+// What a preset sets.
+struct Effort {
+  int num_views, num_steps, samples_per_pixel, fit_iterations, turntable_frames;
+};
+constexpr Effort kDraft{4, 8, 16, 8, 0}, kFast{4, 12, 32, 8, 0}, kQuality{16, 30, 128, 32, 36};
+
+const Effort& effort_of(Preset preset) {
+  return preset == Preset::kDraft ? kDraft : preset == Preset::kFast ? kFast : kQuality;
+}
+
 }  // namespace
 
 // Sets several options at once. Those that are given themselves win: they come later in the list.
 Option preset_option() {
-  const auto presets =
-      choice<Preset>({{"usual", Preset::kUsual}, {"fast", Preset::kFast}, {"quality", Preset::kQuality}});
+  const auto presets = choice<Preset>({{"usual", Preset::kUsual},
+                                       {"draft", Preset::kDraft},
+                                       {"fast", Preset::kFast},
+                                       {"quality", Preset::kQuality}});
   const About about{
       .name = "preset",
       .help =
-          "fast: 4 views, 12 steps, 8 iterations of the fit, no turntable; to try prompts. quality: 16 "
-          "views, 30 steps, 32 iterations of the fit, smoother renders. Options given beside it win."};
+          "draft: 4 views, 8 steps, and it ends with the edited views, in seconds; to try prompts. fast: 4 "
+          "views, 12 steps, 8 iterations of the fit, no turntable. quality: 16 views, 30 steps, 32 "
+          "iterations of the fit, smoother renders. Options given beside it win."};
   Option option = described(about, "Edit", kEverything, presets);
   option.default_text = "usual";
   option.set = [named = option, presets](Config& c, const json& value) {
@@ -42,12 +55,12 @@ Option preset_option() {
     if (!preset) refuse(named, value);
     c.preset = *preset;
     if (c.preset == Preset::kUsual) return;
-    const bool fast = c.preset == Preset::kFast;
-    c.inputs.orbit.num_views = fast ? 4 : 16;
-    c.edit.options.num_steps = fast ? 12 : 30;
-    c.render.samples_per_pixel = c.report.samples_per_pixel = fast ? 32 : 128;
-    c.fit.options.iterations = fast ? 8 : 32;
-    c.report.turntable_frames = fast ? 0 : 36;
+    const Effort& effort = effort_of(c.preset);
+    c.inputs.orbit.num_views = effort.num_views;
+    c.edit.options.num_steps = effort.num_steps;
+    c.render.samples_per_pixel = c.report.samples_per_pixel = effort.samples_per_pixel;
+    c.fit.options.iterations = effort.fit_iterations;
+    c.report.turntable_frames = effort.turntable_frames;
   };
   option.get = [presets](const Config& c) { return presets.encode(c.preset); };
   return option;
@@ -72,6 +85,21 @@ std::vector<Option> edit_options() {
                    "\"a clean new object\", so that only what the prompt says beyond that acts), or none.",
            .default_text = "auto"},
           optional_or_word("auto", text()), [](auto& s) -> auto& { return s.options.negative_prompt; }),
+      list_option(
+          at,
+          {.name = "prompt-for",
+           .placeholder = "MATERIAL=TEXT",
+           .help = "Words for one material, which act on its pixels in place of the --prompt, e.g. "
+                   "\"handle=cracked leather\". `patina info ASSET --prompts` lists the materials.",
+           .default_text = "none"},
+          text(), [](auto& s) -> auto& { return s.prompt_for; }),
+      list_option(
+          at,
+          {.name = "negative-prompt-for",
+           .placeholder = "MATERIAL=TEXT",
+           .help = "What one material should not look like, in place of the --negative-prompt.",
+           .default_text = "none"},
+          text(), [](auto& s) -> auto& { return s.negative_prompt_for; }),
       option(
           at,
           {.name = "strength",

@@ -79,6 +79,13 @@ std::vector<Option> mask_options() {
           truth(), [](auto& s) -> auto& { return s.vertex_color; }),
       list_option(
           at,
+          {.name = "strength-for",
+           .placeholder = "MATERIAL=S",
+           .help = "Edit this material with a share of the --strength, 0 to 1.",
+           .default_text = "1 for each"},
+          text(), [](auto& s) -> auto& { return s.strength_for; }),
+      list_option(
+          at,
           {.name = "protect",
            .placeholder = "MATERIAL",
            .help = "These materials keep every byte, and every pixel in the views.",

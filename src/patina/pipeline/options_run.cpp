@@ -91,11 +91,26 @@ std::vector<Option> input_output_options() {
 }
 
 std::vector<Option> machine_options() {
-  return {seed(), option_of_run({.name = "threads",
-                                 .aliases = {"-j"},
-                                 .placeholder = "N",
-                                 .help = "Processors to use. 0 uses all."},
-                                kMachineGroup, kMachine, integer(0, 1024), &Config::num_threads)};
+  return {seed(),
+          option(
+              Place<EditSettings>{kMachineGroup, &Config::edit, kEdit},
+              {.name = "edit-seed",
+               .placeholder = "N",
+               .help = "Seed of the edit alone: another edit of the same renders.",
+               .default_text = "that of --seed"},
+              integer<uint64_t>(0, std::numeric_limits<uint64_t>::max()),
+              [](auto& s) -> auto& { return s.options.seed; }),
+          option_of_run(
+              {.name = "seeds",
+               .placeholder = "N",
+               .help = "Edit the views with N seeds, from --edit-seed on, show them on one page and end "
+                       "there. Then run again with the --edit-seed that you like: its edit is kept."},
+              kMachineGroup, kEdit, integer(1, 64), &Config::num_seeds),
+          option_of_run({.name = "threads",
+                         .aliases = {"-j"},
+                         .placeholder = "N",
+                         .help = "Processors to use. 0 uses all."},
+                        kMachineGroup, kMachine, integer(0, 1024), &Config::num_threads)};
 }
 
 }  // namespace patina::pipeline

@@ -213,7 +213,7 @@ void RunFolder::clear() {
     for (const std::string& output : stage.outputs) fs::remove(path_ / output, ignored);
     fs::remove(path_ / checkpoint_name(stage.name), ignored);
   }
-  for (const char* made : {"preview", "metrics.json", "report.html", "config.json"})
+  for (const char* made : {"preview", "variants", "metrics.json", "report.html", "config.json"})
     fs::remove_all(path_ / made, ignored);
   stages_.clear();
   write_json(path_ / "stages.json", json::array());
@@ -222,7 +222,10 @@ void RunFolder::clear() {
 void RunFolder::adopt_stage(const RunFolder& from, std::string_view name) {
   const StageRecord* record = from.stage(name);
   if (!record || !from.is_complete(*record)) return;
-  if (const StageRecord* own = stage(name); own && own->key == record->key && is_complete(*own)) return;
+  if (const StageRecord* own = stage(name)) {
+    if (own->key == record->key && is_complete(*own)) return;
+    if (!copy_what_was_changed_by_hand(*own).empty() && keep_) return;
+  }
   for (const std::string& output : record->outputs) {
     fs::create_directories((path_ / output).parent_path());
     write_file_with(path_ / output, [&](const fs::path& temporary) {

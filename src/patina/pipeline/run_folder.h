@@ -4,6 +4,7 @@
 //   config.json          every option's value, version, asset
 //   stages.json          per stage: the key of its inputs, its outputs, seconds, peak memory, metrics
 //   views/  detail/  textures/  metrics.json  report.html  turntable.webp
+//   variants/            edits to choose from, each in a run folder of its own
 //   preview/             preview.html, while textures are fitted: what they show so far and the loss;
 //                        the textures of a fit that was stopped
 #pragma once
@@ -73,7 +74,8 @@ class RunFolder {
   const StageRecord* stage(std::string_view name) const;
 
   /// Takes over a stage from a run that has run it, outputs and record, unless it is here already. The
-  /// stage is then skipped as if it had run here. Does nothing if `from` has not run it.
+  /// stage is then skipped as if it had run here. Does nothing if `from` has not run it, or where outputs of
+  /// its own were changed by hand and are kept; else copies of these stay beside.
   void adopt_stage(const RunFolder& from, std::string_view name);
 
   /// Partial results of a long stage, kept under the stage's key: a checkpoint written for other inputs is

@@ -24,12 +24,15 @@ struct RenderSettings {
 
 /// Where the asset may change, and how much there.
 struct MaskSettings {
-  std::vector<std::string> files;    // pictures: "FILE" for all materials that may change, or "MATERIAL=FILE"
-  bool vertex_color = false;         // the mesh's own vertex colours too
-  std::vector<std::string> protect;  // names of materials that keep every pixel and texel
+  std::vector<std::string> files;  // pictures: "FILE" for all materials that may change, or "MATERIAL=FILE"
+  bool vertex_color = false;       // the mesh's own vertex colours too
+  std::vector<std::string> strength_for;  // "MATERIAL=S": its share of the strength, in [0,1]
+  std::vector<std::string> protect;       // names of materials that keep every pixel and texel
   std::vector<masks::PlaceAmount> where;  // what the asset's shape is like there; the largest counts
 
-  bool any() const { return !files.empty() || vertex_color || !protect.empty() || !where.empty(); }
+  bool any() const {
+    return !files.empty() || vertex_color || !strength_for.empty() || !protect.empty() || !where.empty();
+  }
 };
 
 struct EditSettings {
@@ -38,6 +41,7 @@ struct EditSettings {
   diffusion::Device device = diffusion::Device::kAuto;
   bool low_memory = false;
   correspond::NoiseMode noise = correspond::NoiseMode::kExact;
+  std::vector<std::string> prompt_for, negative_prompt_for;  // "MATERIAL=TEXT", see part_prompts.h
   diffusion::EditOptions options{.bias_weight = 1.8f};  // docs/decisions/0012; the initial noise has its seed
 };
 

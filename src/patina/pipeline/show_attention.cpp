@@ -62,7 +62,7 @@ ShownAttention show_attention(Config config, const AttentionOptions& options, Ru
   const PreparedEdit prepared = prepare_edit(bench, unmasked(bench), views, config.edit, model, progress);
   ShownAttention shown;
   shown.negative_prompt = diffusion::guidance_of(model, config.edit.options).negative_prompt;
-  shown.captured = diffusion::capture_attention(model, prepared.inputs, config.edit.options, layer,
+  shown.captured = diffusion::capture_attention(model, prepared.inputs, prepared.options, layer,
                                                 options.evaluation, progress);
   if (shown.captured.bias_level < 0)
     throw Error(ErrorCode::kUsage, "layer",

@@ -10,8 +10,10 @@
 #include "patina/correspond/correspondences.h"
 #include "patina/correspond/noise.h"
 #include "patina/image/image_io.h"
+#include "patina/pipeline/part_prompts.h"
 #include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
+#include "patina/pipeline/variants.h"
 
 namespace patina::pipeline {
 
@@ -125,12 +127,16 @@ PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, cons
     noise.insert(noise.end(), field.values.begin(), field.values.end());
   noise.resize(noise.size() / (4 * noises.size()) * static_cast<size_t>(model.latent_channels()));
 
+  const PartPrompts parts = part_prompts(bench, strength, settings);
+  prepared.options = settings.options;
+  prepared.options.part_prompts = parts.prompts;
   prepared.inputs = {.grid = views.set.grid,
                      .tile_views = views.tile,
                      .normal_views = views.normal,
                      .noise = std::move(noise),
                      .bias_levels = {},
-                     .strength_views = strength.views};
+                     .strength_views = strength.views,
+                     .part_views = part_views(parts, views.set)};
   if (settings.options.bias_weight != 0) {
     start = Clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
@@ -143,6 +149,7 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
                               const EditSettings& settings, ResolvedModel& resolved, RunFolder& run,
                               const RunProgress& progress) {
   const std::string key = edit_key(bench, strength, views, settings, resolved);
+  adopt_variant(run, settings.options.seed, key);
   run.run_stage("detail", key, progress, [&] {
     const auto start = Clock::now();
     const int64_t bytes_before = resident_bytes();
@@ -151,7 +158,7 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
     const double load_seconds = seconds_since(start);
     const PreparedEdit prepared = prepare_edit(bench, strength, views, settings, model, progress);
 
-    const diffusion::EditOptions& options = settings.options;
+    const diffusion::EditOptions& options = prepared.options;
     const diffusion::EditMemory memory = diffusion::predict_memory(
         model, views.set.grid, bench.cameras[0].width, bench.cameras[0].height, options);
     if (model.device() == diffusion::Device::kCpu) warn_of_memory(memory, settings, progress);
@@ -175,12 +182,18 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
       result.outputs.push_back(numbered("detail/strength", v, ".png"));
       write_image(run.file(result.outputs.back()), strength_picture(strength.views[v]));
     }
+    const std::vector<Image> parts = part_pictures(prepared.inputs.part_views, views.tile);
+    for (size_t v = 0; v < parts.size(); ++v) {
+      result.outputs.push_back(numbered("detail/parts", v, ".png"));
+      write_image(run.file(result.outputs.back()), parts[v]);
+    }
     const diffusion::Guidance guidance = diffusion::guidance_of(model, options);
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model.latent_channels());
     result.metrics = {
         {"noise", prepared.noise_metrics},
         {"model", model.description()},
         {"prompt", options.prompt},
+        {"parts", parts_as_json(part_prompts(bench, strength, settings), bench)},
         {"guidance", {{"scale", guidance.scale}, {"negative_prompt", guidance.negative_prompt}}},
         {"latent_pixels", latent_pixels},
         {"memory_mb",

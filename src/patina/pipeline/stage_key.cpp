@@ -67,11 +67,17 @@ void visit(const diffusion::ModelPaths& s, Visitor& visitor) {
           model_dirs, prediction);
 }
 template <class Visitor>
+void visit(const diffusion::PartPrompt& s, Visitor& visitor) {
+  const auto& [prompt, negative_prompt] = s;
+  visitor(prompt, negative_prompt);
+}
+template <class Visitor>
 void visit(const diffusion::EditOptions& s, Visitor& visitor) {
-  const auto& [prompt, negative_prompt, clip_skip, num_steps, guidance_scale, strength, tile_scale,
-               normal_scale, fine_detail, scheduler, bias_weight, bias_scaling, bias_controlnet, seed] = s;
-  visitor(prompt, negative_prompt, clip_skip, num_steps, guidance_scale, strength, tile_scale, normal_scale,
-          fine_detail, scheduler, bias_weight, bias_scaling, bias_controlnet, seed);
+  const auto& [prompt, negative_prompt, part_prompts, clip_skip, num_steps, guidance_scale, strength,
+               tile_scale, normal_scale, fine_detail, scheduler, bias_weight, bias_scaling, bias_controlnet,
+               seed] = s;
+  visitor(prompt, negative_prompt, part_prompts, clip_skip, num_steps, guidance_scale, strength, tile_scale,
+          normal_scale, fine_detail, scheduler, bias_weight, bias_scaling, bias_controlnet, seed);
 }
 template <class Visitor>
 void visit(const inverse::FitOptions& s, Visitor& visitor) {
@@ -92,13 +98,13 @@ void visit(const masks::PlaceAmount& s, Visitor& visitor) {
 }
 template <class Visitor>
 void visit(const MaskSettings& s, Visitor& visitor) {
-  const auto& [files, vertex_color, protect, where] = s;
-  visitor(files, vertex_color, protect, where);
+  const auto& [files, vertex_color, strength_for, protect, where] = s;
+  visitor(files, vertex_color, strength_for, protect, where);
 }
 template <class Visitor>
 void visit(const EditSettings& s, Visitor& visitor) {
-  const auto& [model, dtype, device, low_memory, noise, options] = s;
-  visitor(model, dtype, device, low_memory, noise, options);
+  const auto& [model, dtype, device, low_memory, noise, prompt_for, negative_prompt_for, options] = s;
+  visitor(model, dtype, device, low_memory, noise, prompt_for, negative_prompt_for, options);
 }
 template <class Visitor>
 void visit(const FitSettings& s, Visitor& visitor) {

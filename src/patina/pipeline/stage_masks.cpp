@@ -1,5 +1,6 @@
 // The stage before all others: masks, from files and from the mesh, become one strength map a material.
 #include <algorithm>
+#include <charconv>
 
 #include <fmt/format.h>
 
@@ -35,25 +36,11 @@ struct MaskFile {
 MaskFile parsed(const std::string& text, const Workbench& bench, const std::vector<bool>& may_change) {
   std::error_code ignored;
   if (text.find('=') == std::string::npos || fs::exists(text, ignored)) return {text, may_change, true};
-  for (size_t at = text.find('='); at != std::string::npos; at = text.find('=', at + 1)) {
-    const std::string name = text.substr(0, at);
-    const bool last = text.find('=', at + 1) == std::string::npos;
-    const bool known = std::any_of(bench.asset.materials.begin(), bench.asset.materials.end(),
-                                   [&](const asset::Material& m) { return m.name == name; });
-    if (!known && !last) continue;
-    if (at + 1 == text.size())
-      throw Error(ErrorCode::kUsage, "mask",
-                  fmt::format("expected FILE or MATERIAL=FILE, found '{}'", printable(text)));
-    MaskFile mask{text.substr(at + 1),
-                  named_materials(bench.asset, {known ? name : text.substr(0, text.find('='))}, "mask")};
-    for (size_t m = 0; m < mask.materials.size(); ++m)
-      if (mask.materials[m] && !may_change[m])
-        throw Error(ErrorCode::kUsage, "mask",
-                    fmt::format("material '{}' is not one of those that may change, so it can have no mask",
-                                printable(name)));
-    return mask;
-  }
-  return {};
+  constexpr const char* kForm = "FILE or MATERIAL=FILE";
+  ForMaterial mask = for_material(bench.asset, may_change, text, "mask", kForm);
+  if (mask.value.empty())
+    throw Error(ErrorCode::kUsage, "mask", fmt::format("expected {}, found '{}'", kForm, printable(text)));
+  return {std::move(mask.value), std::move(mask.materials), false};
 }
 
 std::vector<MaskFile> parsed(const std::vector<std::string>& texts, const Workbench& bench,
@@ -131,6 +118,20 @@ ivec2 made_size(const asset::Map& texture) {
   return glm::clamp(ivec2(texture.texels.width, texture.texels.height), kMinMadeSide, kMaxMadeSide);
 }
 
+// "MATERIAL=S": a grey that is the same all over the material.
+void multiply_share(const Workbench& bench, const std::vector<bool>& may_change, const std::string& text,
+                    std::vector<std::optional<asset::Map>>& maps) {
+  const ForMaterial part = for_material(bench.asset, may_change, text, "strength-for", "MATERIAL=S");
+  float share = -1;
+  const char* const end = part.value.data() + part.value.size();
+  const auto [rest, failure] = std::from_chars(part.value.data(), end, share);
+  if (failure != std::errc() || rest != end || !(share >= 0 && share <= 1))
+    throw Error(ErrorCode::kUsage, "strength-for",
+                fmt::format("expected MATERIAL=S with S from 0 to 1, found '{}'", printable(text)));
+  for (size_t m = 0; m < maps.size(); ++m)
+    if (part.materials[m]) multiply(maps[m], laid_out(bench, m, Image(1, 1, 1, share)));
+}
+
 void multiply_vertex_colors(const Workbench& bench, const std::vector<bool>& may_change,
                             std::vector<std::optional<asset::Map>>& maps) {
   bool any = false;
@@ -160,6 +161,7 @@ std::vector<std::optional<asset::Map>> combined(const Workbench& bench, const st
     for (size_t m = 0; m < maps.size(); ++m)
       if (file.materials[m]) multiply(maps[m], laid_out(bench, m, mask));
   }
+  for (const std::string& share : settings.strength_for) multiply_share(bench, may_change, share, maps);
   if (settings.vertex_color) multiply_vertex_colors(bench, may_change, maps);
   for (size_t m = 0; m < maps.size() && !settings.where.empty(); ++m) {
     if (!may_change[m]) continue;

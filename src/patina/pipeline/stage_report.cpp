@@ -163,6 +163,18 @@ std::vector<report::MaskPicture> mask_pictures(const Workbench& bench, const Str
   return pictures;
 }
 
+// The parts with words of their own.
+std::vector<report::PartWords> part_words(const RunFolder& run) {
+  std::vector<report::PartWords> words;
+  const StageRecord* edit = run.stage("detail");
+  if (!edit) return words;
+  for (const json& part : edit->metrics.value("parts", json::array()))
+    words.push_back({part.at("materials").get<std::vector<std::string>>(), part.at("prompt"),
+                     part.at("negative_prompt").is_null() ? "" : part.at("negative_prompt"),
+                     part.at("color")});
+  return words;
+}
+
 // What the page says the run was asked for: config.json, as `patina` writes it.
 json asked_for(const RunFolder& run) {
   const json config = read_json(run.file("config.json"));
@@ -198,6 +210,8 @@ void report_stage(const Workbench& bench, const Strength& strength, const Render
   page.relit = relit_pictures(bench, lights, run);
   page.masks = mask_pictures(bench, strength);
   page.strength = strength.views;
+  page.parts = part_words(run);
+  if (!page.parts.empty()) page.part_views = read_numbered(run, "detail/parts", bench.cameras);
   page.viewer = viewer(bench, fitted, lights, record.metrics.at("relight"), views.set.exposure_ev);
   page.config = asked_for(run);
   page.metrics = gather_metrics(run, record.metrics);

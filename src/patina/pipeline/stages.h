@@ -49,6 +49,7 @@ RenderedViews render_stage(const Workbench& bench, const RenderSettings& setting
 /// Error{kUsage} if the views do not fit the model.
 struct PreparedEdit {
   diffusion::EditInputs inputs;
+  diffusion::EditOptions options;  // the settings' own, and the words of single materials
   nlohmann::json noise_metrics;
   double noise_seconds = 0, correspond_seconds = 0;
 };

@@ -165,6 +165,28 @@ std::vector<bool> named_materials(const asset::Asset& asset, const std::vector<s
   return wanted;
 }
 
+ForMaterial for_material(const asset::Asset& asset, const std::vector<bool>& may_change,
+                         const std::string& text, const char* option, const char* form) {
+  // The first name that is a material's; else the first at all, which named_materials() refuses.
+  size_t end = text.find('=');
+  for (size_t at = end; at != std::string::npos; at = text.find('=', at + 1))
+    if (std::any_of(asset.materials.begin(), asset.materials.end(), [&](const asset::Material& m) {
+          return m.name == std::string_view(text).substr(0, at);
+        })) {
+      end = at;
+      break;
+    }
+  if (end == std::string::npos)
+    throw Error(ErrorCode::kUsage, option, fmt::format("expected {}, found '{}'", form, printable(text)));
+  ForMaterial result{named_materials(asset, {text.substr(0, end)}, option), text.substr(end + 1)};
+  for (size_t m = 0; m < result.materials.size(); ++m)
+    if (result.materials[m] && !may_change[m])
+      throw Error(ErrorCode::kUsage, option,
+                  fmt::format("material '{}' is not one of those that may change",
+                              printable(text.substr(0, end), 60)));
+  return result;
+}
+
 Workbench open_workbench(const InputSettings& inputs, const Progress& progress) {
   Workbench bench;
   bench.asset = asset::read_asset(inputs.asset);

@@ -39,6 +39,16 @@ Workbench open_workbench(const InputSettings& inputs, const Progress& progress);
 std::vector<bool> named_materials(const asset::Asset& asset, const std::vector<std::string>& names,
                                   const char* option);
 
+/// "MATERIAL=VALUE" taken apart; both may hold '=', the value may be empty.
+struct ForMaterial {
+  std::vector<bool> materials;  // of this name
+  std::string value;
+};
+/// Throws Error{kUsage}, `option` as context, where `text` is not of the `form`, e.g. "MATERIAL=FILE", and
+/// for a material that the asset does not have or that may not change.
+ForMaterial for_material(const asset::Asset& asset, const std::vector<bool>& may_change,
+                         const std::string& text, const char* option, const char* form);
+
 /// Cameras as JSON, relative to the asset's origin: {"cameras": [{"world_from_camera": 16 numbers column by
 /// column, "fov_degrees", "width", "height"}], ...}.
 nlohmann::json cameras_to_json(std::span<const render::Camera> cameras);

@@ -13,6 +13,7 @@
 #include "patina/render/path_tracer.h"
 #include "patina/render/scene.h"
 #include "patina/report/other_light.h"
+#include "patina/report/parts.h"
 #include "patina/report/where.h"
 
 namespace patina::report {
@@ -43,6 +44,8 @@ struct ReportData {
   std::vector<RelitPictures> relit;
   std::vector<MaskPicture> masks;
   std::vector<Image> strength;  // of the masks, one a view (where.h); empty: none
+  std::vector<PartWords> parts;
+  std::vector<Image> part_views;  // one a view (parts.h); empty: none
   std::vector<float> loss;
   nlohmann::json config, metrics;
   std::vector<std::string> warnings;

@@ -5,6 +5,8 @@
 
 #include <ATen/ATen.h>
 
+#include "patina/base/check.h"
+
 namespace patina::diffusion {
 namespace {
 
@@ -65,6 +67,21 @@ at::Tensor Attention::operator()(const at::Tensor& x, const at::Tensor& context,
   return record(name, to_out_0(nn::attend(q, k, v, num_heads, bias), record));
 }
 
+at::Tensor Attention::in_parts(const at::Tensor& x, std::span<const at::Tensor> texts,
+                               std::span<const PartPixels> parts, const nn::Recorder& record) const {
+  PATINA_CHECK_EQ(texts.size(), parts.size());
+  const at::Tensor q = to_q(x, record);
+  at::Tensor attended = at::zeros_like(q);
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].index.numel() == 0) continue;
+    const at::Tensor index = parts[i].index.to(q.device()), share = parts[i].share.to(q.device(), q.dtype());
+    const at::Tensor own =
+        nn::attend(q.index_select(1, index), to_k(texts[i], record), to_v(texts[i], record), num_heads);
+    attended.index_add_(1, index, own * share);
+  }
+  return record(name, to_out_0(attended, record));
+}
+
 at::Tensor FeedForward::operator()(const at::Tensor& x, const nn::Recorder& record) const {
   // The values between the layers are eight times as many as those around them, and each token is for itself.
   std::vector<at::Tensor> parts;
@@ -83,7 +100,10 @@ at::Tensor TransformerBlock::operator()(const at::Tensor& x, int64_t height, int
 
   const at::Tensor n1 = norm1(x, record);
   at::Tensor h = x + attn1(n1, n1, record, bias);
-  h = h + attn2(norm2(h, record), conditions.text, record);
+  const at::Tensor n2 = norm2(h, record);
+  h = h + (conditions.parts
+               ? attn2.in_parts(n2, conditions.texts, conditions.parts->at(height, width), record)
+               : attn2(n2, conditions.texts.front(), record));
   h = h + ff(norm3(h, record), record);
   return record(name, h);
 }

@@ -6,10 +6,12 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "patina/diffusion/files/config.h"
+#include "patina/diffusion/networks/part_pixels.h"
 #include "patina/nn/attend.h"
 #include "patina/nn/layers.h"
 
@@ -18,7 +20,8 @@ namespace patina::diffusion {
 /// What every block of one evaluation of a network sees beside its input.
 struct Conditions {
   at::Tensor time;                              // [B,E], through SiLU already
-  at::Tensor text;                              // [B,T,D]
+  std::vector<at::Tensor> texts;                // [B,T,D] of the prompt, and of each part of the picture
+  const PartLevels* parts = nullptr;            // which pixels attend to which text; null: all to the first
   const nn::SelfAttentionBias* bias = nullptr;  // null: none
   const nn::Recorder& record;
 };
@@ -48,6 +51,9 @@ struct Attention {
 
   at::Tensor operator()(const at::Tensor& x, const at::Tensor& context, const nn::Recorder& record,
                         const nn::LevelBias& bias = {}) const;
+  /// Every pixel of x attends to the text of the part that it shows, pixels of several parts to several.
+  at::Tensor in_parts(const at::Tensor& x, std::span<const at::Tensor> texts,
+                      std::span<const PartPixels> parts, const nn::Recorder& record) const;
 };
 
 /// Gated feed-forward: net.2(a · gelu(b)) with (a, b) = net.0.proj(x).

@@ -67,8 +67,7 @@ ControlResiduals ControlNet::operator()(const NetworkInputs& inputs, const at::T
   PATINA_CHECK_EQ(inputs.sample.size(1), config_.unet.in_channels);
   const c10::Device device = encoder_.conv_in.weight.device();
   const at::Tensor x = inputs.sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
-  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.tokens.to(device, type_),
-                              inputs.bias, record};
+  const Conditions conditions = encoder_.conditions(inputs, record);
   auto [skips, mid] = encoder_(encoder_.conv_in(x, record) + hint, conditions);
 
   ControlResiduals residuals;

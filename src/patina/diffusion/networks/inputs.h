@@ -7,6 +7,7 @@
 
 #include <ATen/core/Tensor.h>
 
+#include "patina/diffusion/networks/part_pixels.h"
 #include "patina/nn/attend.h"
 
 namespace patina::diffusion {
@@ -29,6 +30,10 @@ struct NetworkInputs {
   at::Tensor timesteps;                         // [1] or [B] f32
   TextConditioning text;                        // of B prompts
   const nn::SelfAttentionBias* bias = nullptr;  // acts on the self-attention; null: none
+  // Parts of the picture that attend to words of their own: of B prompts, one a part. `part_levels` has one
+  // part more, the first, which attends to `text`; null: all of the picture does.
+  std::vector<TextConditioning> part_texts = {};
+  const PartLevels* part_levels = nullptr;
 };
 
 }  // namespace patina::diffusion

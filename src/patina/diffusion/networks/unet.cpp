@@ -96,6 +96,13 @@ at::Tensor Encoder::time(const at::Tensor& timesteps, const nn::Recorder& record
   return nn::silu(record("time_embedding", time_embedding.linear_2(hidden, record)));
 }
 
+Conditions Encoder::conditions(const NetworkInputs& inputs, const nn::Recorder& record) const {
+  const at::TensorOptions options = conv_in.weight.options();
+  std::vector<at::Tensor> texts{inputs.text.tokens.to(options)};
+  for (const TextConditioning& text : inputs.part_texts) texts.push_back(text.tokens.to(options));
+  return {time(inputs.timesteps, record), std::move(texts), inputs.part_levels, inputs.bias, record};
+}
+
 Encoder::Outputs Encoder::operator()(const at::Tensor& x, const Conditions& conditions) const {
   const nn::Recorder& record = conditions.record;
   Outputs outputs{{x}, {}};
@@ -143,8 +150,7 @@ at::Tensor UNet::operator()(const NetworkInputs& inputs, ControlResiduals contro
   const c10::Device device = encoder_.conv_in.weight.device();
   at::Tensor sample = inputs.sample.to(device, type_).contiguous(at::MemoryFormat::ChannelsLast);
   if (config.center_input_sample) sample = 2 * sample - 1;
-  const Conditions conditions{encoder_.time(inputs.timesteps, record), inputs.text.tokens.to(device, type_),
-                              inputs.bias, record};
+  const Conditions conditions = encoder_.conditions(inputs, record);
   auto [skips, h] = encoder_(encoder_.conv_in(sample, record), conditions);
   if (control.mid.defined()) {
     PATINA_CHECK_EQ(control.down.size(), skips.size());

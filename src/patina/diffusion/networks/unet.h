@@ -50,6 +50,8 @@ struct Encoder {
 
   /// timesteps [B] f32 -> [B,E], through SiLU.
   at::Tensor time(const at::Tensor& timesteps, const nn::Recorder& record) const;
+  /// What the blocks see of the inputs, on the weights' device and of their type.
+  Conditions conditions(const NetworkInputs& inputs, const nn::Recorder& record) const;
   /// Everything after conv_in: x [B,C0,H,W] -> the kept outputs, finest first (x itself is the first), and
   /// the middle's.
   struct Outputs {

@@ -1,0 +1,107 @@
+// Words for single materials, from the command line to the edited views and the report.
+#include "patina/pipeline/part_prompts.h"
+
+#include <gtest/gtest.h>
+
+#include "in_process.h"
+#include "patina/base/files.h"
+#include "patina/image/image_io.h"
+#include "process.h"
+#include "small_kettle.h"
+#include "support.h"
+
+namespace patina::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Four small views and few steps of the bundled model.
+ProcessResult enhanced(const fs::path& output, std::vector<std::string> more) {
+  std::vector<std::string> arguments{"enhance", small_kettle().string(), "-p", "a clean new kettle"};
+  for (const char* word : {"--views", "4", "--resolution", "128", "--samples", "4", "-s", "6",
+                           "--fit-iterations", "2", "--turntable", "0", "-o"})
+    arguments.emplace_back(word);
+  arguments.push_back(output.string());
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return patina(arguments);
+}
+
+// Mean of green less red over the pixels of `color` in the pictures of the parts, all views.
+double greenness(const fs::path& run, const vec3& color) {
+  double sum = 0, count = 0;
+  for (const char* view : {"00.png", "01.png", "02.png", "03.png"}) {
+    const Image edited = read_image(run / "detail" / (std::string("edited_") + view)),
+                parts = read_image(run / "detail" / (std::string("parts_") + view));
+    for (size_t i = 0; i < edited.num_pixels(); ++i) {
+      // The part's colour over grey: what is left without its share must be grey.
+      vec3 grey(0.0f);
+      for (int c = 0; c < 3; ++c) grey[c] = parts.pixels[3 * i + static_cast<size_t>(c)] - 0.55f * color[c];
+      if (max_component(glm::abs(grey - vec3(grey.x))) > 0.02f) continue;
+      sum += edited.pixels[3 * i + 1] - edited.pixels[3 * i];
+      count += 1;
+    }
+  }
+  EXPECT_GT(count, 200);
+  return sum / count;
+}
+
+TEST(PartPrompts, each_material_follows_its_own_words) {
+  const TemporaryFolder folder;
+  const fs::path output = folder.path() / "out.glb", run = folder.path() / "out.patina-run";
+  const ProcessResult result =
+      enhanced(output, {"--prompt-for", "enamel=green moss", "wood=rust", "--negative-prompt-for",
+                        "steel=rust", "--guidance-scale", "3"});
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  const vec3 first = vec3(230, 159, 0) / 255.0f, third = vec3(0, 158, 115) / 255.0f;
+  EXPECT_GT(greenness(run, first), greenness(run, third) + 0.1);
+  const std::string report = read_text_file(run / "report.html");
+  for (const char* text : {"What, part by part", "green moss", "away from <em>rust</em>"})
+    EXPECT_NE(report.find(text), std::string::npos) << text;
+}
+
+TEST(PartPrompts, wrong_ones_are_refused_before_rendering) {
+  struct Refusal {
+    std::vector<std::string> options, says;
+  };
+  const std::vector<Refusal> refusals{
+      {{"--prompt-for", "moss"}, {"prompt-for", "MATERIAL=TEXT", "'moss'"}},
+      {{"--prompt-for", "glass=moss"}, {"prompt-for", "'glass'", "'enamel'", "'steel'", "'wood'"}},
+      {{"--prompt-for", "enamel=moss", "enamel=rust"}, {"prompt-for", "'enamel'", "twice"}},
+      {{"--prompt-for", "steel=moss", "--protect", "steel"}, {"'steel'", "may change"}},
+      {{"--negative-prompt-for", "glass=moss"}, {"negative-prompt-for", "'glass'"}},
+      {{"--strength-for", "enamel"}, {"strength-for", "MATERIAL=S"}},
+      {{"--strength-for", "enamel=2"}, {"strength-for", "from 0 to 1", "'enamel=2'"}},
+      {{"--strength-for", "glass=0.5"}, {"strength-for", "'glass'"}},
+  };
+  for (const Refusal& refusal : refusals) {
+    SCOPED_TRACE(refusal.options.back());
+    const TemporaryFolder folder;
+    const ProcessResult result = enhanced(folder.path() / "out.glb", refusal.options);
+    EXPECT_EQ(result.exit_code, 2) << result.error;
+    for (const std::string& text : refusal.says)
+      EXPECT_NE(result.error.find(text), std::string::npos) << text << " in " << result.error;
+    EXPECT_FALSE(fs::exists(folder.path() / "out.patina-run" / "views"));
+  }
+}
+
+TEST(PartPrompts, info_prints_a_file_to_fill_in_that_patina_reads) {
+  const TemporaryFolder folder;
+  const ProcessResult printed = patina({"info", small_kettle().string(), "--prompts"});
+  ASSERT_EQ(printed.exit_code, 0) << printed.error;
+  std::string toml = printed.output;
+  for (const char* name : {"enamel=", "steel=", "wood="})
+    EXPECT_NE(toml.find(name), std::string::npos) << toml;
+  // Filled in but for one, and with a material that the asset has not: the message shows that it was read.
+  toml.replace(toml.find("enamel="), 7, "enamel=green moss");
+  toml.replace(toml.find("wood="), 5, "glass=rust");
+  toml.replace(toml.find("prompt = \"\""), 11, "prompt = \"a kettle\"");
+  write_file(folder.path() / "prompts.toml", toml);
+  const ProcessResult result =
+      patina({"enhance", small_kettle().string(), "--config", (folder.path() / "prompts.toml").string(), "-o",
+              (folder.path() / "out.glb").string()});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.error.find("'glass'"), std::string::npos) << result.error;
+}
+
+}  // namespace
+}  // namespace patina::test
