@@ -211,12 +211,12 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
   run->denoiser = {&networks.unet,
                    std::move(controls),
                    text,
-                   std::move(part_texts),
-                   std::move(part_levels),
                    guidance.scale,
                    guides_in_one_batch(networks.unet.config(), run->shape[2] * run->shape[3]),
                    &run->bias,
                    options.bias_controlnet};
+  run->denoiser.part_texts = std::move(part_texts);
+  run->denoiser.part_levels = std::move(part_levels);
 
   // Where each latent pixel joins; without strengths all do so at the start.
   std::vector<int> calls;

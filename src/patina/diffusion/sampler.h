@@ -33,13 +33,13 @@ struct Denoiser {
   const UNet* unet = nullptr;
   std::vector<Control> controls;
   TextConditioning text;  // of two prompts, the negative one first; of one without guidance
-  std::vector<TextConditioning> part_texts = {};  // likewise, of the parts that have words of their own
-  std::optional<PartLevels> part_levels = std::nullopt;  // where these act; nullopt: there are none
   float guidance_scale = 1;
   bool one_batch = true;  // both prompts of guidance in one evaluation; else in turn, the negative one first
-  const nn::SelfAttentionBias* bias = nullptr;  // null: none
-  bool bias_controls = false;                   // whether it acts on the ControlNets too
-  nn::Recorder record = {};                     // listens to the U-Net
+  const nn::SelfAttentionBias* bias = nullptr;    // null: none
+  bool bias_controls = false;                     // whether it acts on the ControlNets too
+  nn::Recorder record = {};                       // listens to the U-Net
+  std::vector<TextConditioning> part_texts = {};  // likewise, of the parts that have words of their own
+  std::optional<PartLevels> part_levels = std::nullopt;  // where these act; nullopt: there are none
 
   /// latents [1,C,H,W] f32, scaled as the scheduler asks.
   Guided operator()(const at::Tensor& latents, double timestep) const;
