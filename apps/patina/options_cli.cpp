@@ -46,9 +46,31 @@ void add_option(CLI::App& command, const pipeline::Option& option, GivenOptions&
   if (!option.is_list) item.cli->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
 
+// TOML with every list on one line and without the comments in it: CLI11 reads no others.
+std::string with_lists_on_one_line(const std::string& toml) {
+  std::string joined;
+  int depth = 0;
+  char quote = 0;
+  for (size_t i = 0; i < toml.size(); ++i) {
+    const char c = toml[i];
+    if (quote) {
+      if (c == quote && (quote == '\'' || toml[i - 1] != '\\')) quote = 0;
+    } else if (c == '#') {
+      while (i + 1 < toml.size() && toml[i + 1] != '\n') ++i;
+      continue;
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '[' || c == ']') {
+      depth += c == '[' ? 1 : -1;
+    }
+    joined += depth > 0 && !quote && c == '\n' ? ' ' : c;
+  }
+  return joined;
+}
+
 // Options by name from a TOML file; options of other commands are left to them.
 void apply_file(const GivenOptions& given, pipeline::Config& config) {
-  std::istringstream text(read_text_file(given.config_file, 1 << 20));
+  std::istringstream text(with_lists_on_one_line(read_text_file(given.config_file, 1 << 20)));
   std::vector<CLI::ConfigItem> items;
   try {
     items = CLI::ConfigTOML().from_config(text);

@@ -1,4 +1,4 @@
-// Words for single materials, from the command line to the edited views and the report.
+// Words for single materials, from the command line to the edited views.
 #include "patina/pipeline/part_prompts.h"
 
 #include <gtest/gtest.h>
@@ -49,14 +49,11 @@ TEST(PartPrompts, each_material_follows_its_own_words) {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out.glb", run = folder.path() / "out.patina-run";
   const ProcessResult result =
-      enhanced(output, {"--prompt-for", "enamel=green moss", "wood=rust", "--negative-prompt-for",
-                        "steel=rust", "--guidance-scale", "3"});
+      enhanced(output, {"--preset", "draft", "--prompt-for", "enamel=green moss", "wood=rust",
+                        "--negative-prompt-for", "steel=rust", "--guidance-scale", "3"});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   const vec3 first = vec3(230, 159, 0) / 255.0f, third = vec3(0, 158, 115) / 255.0f;
   EXPECT_GT(greenness(run, first), greenness(run, third) + 0.1);
-  const std::string report = read_text_file(run / "report.html");
-  for (const char* text : {"What, part by part", "green moss", "away from <em>rust</em>"})
-    EXPECT_NE(report.find(text), std::string::npos) << text;
 }
 
 TEST(PartPrompts, wrong_ones_are_refused_before_rendering) {

@@ -31,7 +31,7 @@ TEST(Variants, seeds_share_their_renders_and_the_chosen_edit_is_not_made_again) 
 
   ProcessResult result = enhanced(output, {"--seeds", "3", "--edit-seed", "5"});
   ASSERT_EQ(result.exit_code, 0) << result.error;
-  EXPECT_NE(result.output.find("variants.html"), std::string::npos) << result.output;
+  EXPECT_NE(result.error.find("variants.html"), std::string::npos) << result.error;
   EXPECT_FALSE(fs::exists(output));
   EXPECT_FALSE(fs::exists(run / "textures"));
   const fs::path variants = run / "variants";
