@@ -81,23 +81,26 @@ TEST(PartPrompts, wrong_ones_are_refused_before_rendering) {
   }
 }
 
-TEST(PartPrompts, info_prints_a_file_to_fill_in_that_patina_reads) {
+TEST(PartPrompts, info_writes_a_file_to_fill_in_that_patina_reads) {
   const TemporaryFolder folder;
-  const ProcessResult printed = patina({"info", small_kettle().string(), "--prompts"});
-  ASSERT_EQ(printed.exit_code, 0) << printed.error;
-  std::string toml = printed.output;
+  const fs::path file = folder.path() / "prompts.toml";
+  const std::vector<std::string> info{"info", small_kettle().string(), "--prompts", file.string()};
+  ASSERT_EQ(patina(info).exit_code, 0);
+  std::string toml = read_text_file(file);
   for (const char* name : {"enamel=", "steel=", "wood="})
     EXPECT_NE(toml.find(name), std::string::npos) << toml;
   // Filled in but for one, and with a material that the asset has not: the message shows that it was read.
   toml.replace(toml.find("enamel="), 7, "enamel=green moss");
   toml.replace(toml.find("wood="), 5, "glass=rust");
   toml.replace(toml.find("prompt = \"\""), 11, "prompt = \"a kettle\"");
-  write_file(folder.path() / "prompts.toml", toml);
-  const ProcessResult result =
-      patina({"enhance", small_kettle().string(), "--config", (folder.path() / "prompts.toml").string(), "-o",
-              (folder.path() / "out.glb").string()});
+  write_file(file, toml);
+  const ProcessResult result = patina({"enhance", small_kettle().string(), "--config", file.string(), "-o",
+                                       (folder.path() / "out.glb").string()});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.error.find("'glass'"), std::string::npos) << result.error;
+
+  EXPECT_EQ(patina(info).exit_code, 2) << "what was filled in is not written over";
+  EXPECT_EQ(read_text_file(file), toml);
 }
 
 }  // namespace

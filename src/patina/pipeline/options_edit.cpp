@@ -90,7 +90,8 @@ std::vector<Option> edit_options() {
           {.name = "prompt-for",
            .placeholder = "MATERIAL=TEXT",
            .help = "Words for one material, which act on its pixels in place of the --prompt, e.g. "
-                   "\"handle=cracked leather\". `patina info ASSET --prompts` lists the materials.",
+                   "\"handle=cracked leather\". `patina info ASSET --prompts FILE` writes a file with all "
+                   "materials to fill in.",
            .default_text = "none"},
           text(), [](auto& s) -> auto& { return s.prompt_for; }),
       list_option(

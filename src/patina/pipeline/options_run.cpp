@@ -96,8 +96,8 @@ std::vector<Option> machine_options() {
               Place<EditSettings>{kMachineGroup, &Config::edit, kEdit},
               {.name = "edit-seed",
                .placeholder = "N",
-               .help = "Seed of the edit alone: another edit of the same renders.",
-               .default_text = "that of --seed"},
+               .help = "Seed of the edit alone, where it shall not be that of --seed: another edit of the "
+                       "same renders."},
               integer<uint64_t>(0, std::numeric_limits<uint64_t>::max()),
               [](auto& s) -> auto& { return s.options.seed; }),
           option_of_run(
