@@ -46,6 +46,10 @@ auto parsed(const std::string& name, const std::vector<std::string>& values, con
   return out;
 }
 
+// Options that an ablation sets itself.
+const std::vector<std::string> kItsOwn{"output", "run",   "turntable", "views",
+                                       "seeds",  "noise", "bias",      "bias-scaling"};
+
 }  // namespace
 
 void add_ablate(CLI::App& program) {
@@ -92,8 +96,7 @@ void add_ablate(CLI::App& program) {
       ->group("Comparison");
   const auto point = add_point_options(*command, "Comparison");
   const auto given =
-      add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.", pipeline::kEverything,
-                  {"output", "run", "turntable", "views", "seeds", "noise", "bias", "bias-scaling"});
+      add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.", pipeline::kEverything, kItsOwn);
   command->callback([=] {
     find_positional(*given);
     pipeline::Config config;

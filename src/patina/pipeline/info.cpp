@@ -146,8 +146,7 @@ std::string prompts_to_fill_in(const fs::path& path) {
   const asset::Asset asset = asset::read_asset(path);
   asset::require_enhanceable(asset);
   std::string text = fmt::format(
-      "# What {} should look like. Fill in, then:\n"
-      "#   patina enhance ASSET --config THIS_FILE -o OUT.glb\n"
+      "# What {} should look like. Fill in and give it to `patina enhance` as its configuration.\n"
       "prompt = \"\"  # for all materials without words of their own\n"
       "prompt-for = [  # materials without words follow the prompt\n",
       printable(path.filename().string()));

@@ -26,9 +26,8 @@ void write_variants(const std::filesystem::path& path, const VariantsPage& page)
                        {fmt::format("<b>{}</b> edits", page.variants.size()),
                         fmt::format("<b>{}</b> views", page.before.size())});
   html +=
-      "<p class=\"lead\">These are the edited views; textures are made of one of them. Run the same command "
-      "again without <code>--seeds</code> and with the <code>--edit-seed</code> that you like: its edit is "
-      "kept.</p>\n";
+      "<p class=\"lead\">These are the edited views; textures are made of one row. Run the same command "
+      "again for one edit, with the seed that you like as the edit’s own: that edit is kept.</p>\n";
   for (const VariantsPage::Variant& variant : page.variants) html += row(variant.name, variant.edited);
   html += row("Before", page.before);
   html += page_end();
