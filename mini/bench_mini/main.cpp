@@ -161,6 +161,7 @@ void run(const Arguments& arguments) {
       {"model_hash", model_hash},
       {"vae_psnr", at_or_null(parts, "/vae/psnr")},
       {"vae_psnr_object", at_or_null(parts, "/vae/psnr_object")},
+      {"vae_fine_energy", at_or_null(parts, "/vae/fine_energy")},
       {"obedience_top3", at_or_null(parts, "/edits/obedience/top3")},
       {"obedience_runs", at_or_null(parts, "/edits/obedience/runs")},
       {"obedience_classes", at_or_null(parts, "/edits/obedience/classes")},

@@ -13,6 +13,7 @@ nlohmann::json measure_vae(const diffusion::Model& model, std::span<const Masked
                            const std::filesystem::path& sheet) {
   PATINA_CHECK(!pictures.empty());
   double whole = 0, object = 0, lowest = 1e9;
+  ObjectEnergy drawn, wanted;  // sums
   std::vector<Image> shown;
   const size_t every = (pictures.size() + 11) / 12;
   for (size_t i = 0; i < pictures.size(); ++i) {
@@ -21,6 +22,11 @@ nlohmann::json measure_vae(const diffusion::Model& model, std::span<const Masked
     const double psnr = report::psnr(after, before);
     whole += psnr, lowest = std::min(lowest, psnr);
     object += report::psnr(after, before, pictures[i].coverage);
+    const auto add = [&](ObjectEnergy& sum, const Image& picture) {
+      const ObjectEnergy energy = object_energy(picture, pictures[i].coverage);
+      sum.finest += energy.finest, sum.both += energy.both;
+    };
+    add(drawn, after), add(wanted, before);
     if (i % every != 0) continue;
     Image difference(before.width, before.height, 3);
     for (size_t p = 0; p < difference.pixels.size(); ++p)
@@ -32,6 +38,8 @@ nlohmann::json measure_vae(const diffusion::Model& model, std::span<const Masked
   return {{"psnr", pipeline::json_number(whole / count)},
           {"psnr_object", pipeline::json_number(object / count)},
           {"psnr_lowest", pipeline::json_number(lowest)},
+          {"fine_energy", pipeline::json_number(drawn.both / wanted.both)},
+          {"finest_energy", pipeline::json_number(drawn.finest / wanted.finest)},
           {"pictures", pictures.size()}};
 }
 

@@ -24,7 +24,16 @@ struct MaskedPicture {
   Image coverage;  // [H,W,1], the object
 };
 
-/// Mean over pictures of the PSNR, of whole pictures and of the object's pixels; leaves a sheet (a picture,
+/// Energy of the two finest octaves within the object (mini_data::fine_energy), a window's mean. `windows` of
+/// 4 × 4 pixels were counted.
+struct ObjectEnergy {
+  double finest = 0, both = 0;
+  int64_t windows = 0;
+};
+ObjectEnergy object_energy(const Image& srgb, const Image& coverage);
+
+/// Mean over pictures of the PSNR, of whole pictures and of the object's pixels; energy of the finest octaves
+/// of all pictures over that of the true ones; leaves a sheet (a picture,
 /// what came back, their difference × 4) at `sheet`.
 nlohmann::json measure_vae(const diffusion::Model& model, std::span<const MaskedPicture> pictures,
                            const std::filesystem::path& sheet);

@@ -2,6 +2,7 @@
 #include <ATen/ATen.h>
 #include <c10/core/InferenceMode.h>
 
+#include "mini_data/octaves.h"
 #include "patina/diffusion/edit_run.h"
 #include "patina/diffusion/fine_detail.h"
 #include "patina/diffusion/model_state.h"
@@ -30,6 +31,15 @@ Image as_edited_view(const diffusion::Model& model, const Image& before, const I
   const at::Tensor edited = round_trip(*vae, tensor_from_image(after));
   return image_from_tensor(
       (edited + diffusion::fine_detail(*vae, tensor_from_image(before), edited)).clamp(0, 1));
+}
+
+ObjectEnergy object_energy(const Image& srgb, const Image& coverage) {
+  const c10::InferenceMode no_gradients;
+  const at::Tensor inside = mini_data::windows_inside(tensor_from_image(coverage));
+  const mini_data::FineEnergy energy = mini_data::fine_energy(tensor_from_image(srgb));
+  const double windows = std::max(inside.sum().item<double>(), 1.0);
+  return {(energy.finest * inside).sum().item<double>() / windows,
+          (energy.both * inside).sum().item<double>() / windows, static_cast<int64_t>(windows)};
 }
 
 }  // namespace patina::bench

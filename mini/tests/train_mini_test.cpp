@@ -15,8 +15,11 @@
 #include "patina/diffusion/networks/vae.h"
 #include "patina/nn/attend.h"
 #include "support.h"
+#include "train_mini/adversarial_training.h"
 #include "train_mini/colour_path.h"
+#include "train_mini/decoder_data.h"
 #include "train_mini/denoiser_training.h"
+#include "train_mini/discriminator.h"
 #include "train_mini/parameters.h"
 #include "train_mini/samples.h"
 #include "train_mini/vae_training.h"
@@ -36,6 +39,17 @@ TEST(Parameters, gradients_reach_the_leaves_through_a_conversion) {
   };
   loss().backward();
   EXPECT_NEAR(parameters.gradient_norm(), factors.norm().item<double>(), 1e-6);
+}
+
+TEST(Parameters, hold_still_where_no_gradients_are_recorded) {
+  Parameters parameters("test", 1, c10::kCPU);
+  const at::Tensor x = at::ones({2, 2}).set_requires_grad(true);
+  parameters.record_gradients(false);
+  (parameters.find("a.weight", {2, 2}, at::kFloat) * x).sum().backward();
+  EXPECT_EQ(parameters.gradient_norm(), 0);
+  EXPECT_TRUE(x.grad().equal(parameters.start_of("a.weight")));
+  parameters.record_gradients(true);
+  EXPECT_TRUE(parameters.find("a.weight", {2, 2}, at::kFloat).requires_grad());
 }
 
 TEST(Parameters, one_step_is_adamw_with_decoupled_decay) {
@@ -121,6 +135,51 @@ TEST(Attend, gives_the_same_with_gradients_as_without) {
   const at::Tensor recorded = nn::attend(q.clone().set_requires_grad(true), k, v, 3);
   EXPECT_TRUE(recorded.requires_grad());
   EXPECT_LT((plain - recorded).abs().max().item<float>(), 1e-5f);
+}
+
+Discriminator random_discriminator() {
+  Parameters parameters("discriminator", 4, c10::kCPU);
+  nn::WeightReader weights(parameters, at::kFloat);
+  return Discriminator(weights);
+}
+
+TEST(Discriminator, scores_every_eight_pixels_by_what_lies_within_54) {
+  const at::Tensor grain = at::randn({2, 3, 128, 128}).set_requires_grad(true);
+  const at::Tensor scores = random_discriminator()(grain).scores;
+  ASSERT_EQ(scores.sizes(), at::IntArrayRef({2, 1, 16, 16}));
+  scores[0][0][8][8].backward();
+  const at::Tensor seen = grain.grad()[0].abs().sum(0);
+  const auto extent = [&](int64_t axis) { return (seen.sum(axis) > 0).sum().item<int64_t>(); };
+  EXPECT_EQ(extent(0), 54);
+  EXPECT_EQ(extent(1), 54);
+  EXPECT_EQ(grain.grad()[1].abs().sum().item<float>(), 0);
+}
+
+TEST(Discriminator, sees_no_colour_that_does_not_change_from_pixel_to_pixel) {
+  const at::Tensor noise = 0.1 * at::randn({1, 3, 32, 32}), colour = at::randn({1, 3, 1, 1});
+  EXPECT_LT((grain_of(noise + colour) - grain_of(noise)).abs().max().item<float>(), 1e-5f);
+}
+
+TEST(Discriminator, slope_penalty_is_the_square_of_finite_differences) {
+  const Discriminator discriminator = random_discriminator();
+  at::manual_seed(2);
+  const at::Tensor grain = at::randn({1, 3, 16, 16});
+  at::Tensor slope = at::zeros_like(grain);
+  const c10::InferenceMode inference;
+  const double step = 1e-2;
+  for (int64_t i = 0; i < grain.numel(); ++i) {
+    at::Tensor moved = grain.clone();
+    moved.view(-1)[i] += step;
+    const double above = discriminator(moved).scores.sum().item<double>();
+    moved.view(-1)[i] -= 2 * step;
+    slope.view(-1)[i] = (above - discriminator(moved).scores.sum().item<double>()) / (2 * step);
+  }
+  const double expected = slope.square().sum().item<double>() / 4;
+  const auto penalty = [&] {
+    const c10::InferenceMode no_inference(false);
+    return slope_penalty(discriminator, grain.clone()).item<double>();
+  };
+  EXPECT_NEAR(penalty(), expected, 0.02 * expected);
 }
 
 // Pictures of coloured bands: little, but something that can be learnt.
@@ -215,6 +274,18 @@ TEST(ColourPath, an_untrained_autoencoder_tells_colours_apart) {
   }
 }
 
+struct Weights {
+  at::Tensor encoder, decoder;  // all numbers one behind the other
+};
+Weights weights_of(const fs::path& vae) {
+  const nn::SafeTensors file(vae / "diffusion_pytorch_model.safetensors");
+  std::vector<at::Tensor> encoder, decoder;
+  for (const nn::TensorEntry& entry : file.tensors())
+    (entry.name.find("encoder.") == 0 ? encoder : decoder)
+        .push_back(nn::read_tensor(file, entry, at::kFloat).flatten().clone());
+  return {at::cat(encoder), at::cat(decoder)};
+}
+
 TEST(Training, goes_from_pictures_to_a_model_that_edits) {
   const test::TemporaryFolder folder;
   const fs::path work = folder.path() / "work", model = small_model(folder.path() / "model");
@@ -232,6 +303,20 @@ TEST(Training, goes_from_pictures_to_a_model_that_edits) {
   EXPECT_GT(first, 0);
   train_denoiser(work, model, {.run = run, .crops = 2, .views = 2, .grids = 1});
   EXPECT_GT(steps(), first);
+
+  make_decoder_data(work, model, 1, 0);
+  make_decoder_data(work, model, 2, 0);
+  const DecoderData data(work, diffusion::read_vae_config(model / "vae"));
+  EXPECT_EQ(data.size(), 2);
+  const Weights before = weights_of(model / "vae");
+  train_adversarially(work, model, {.run = run, .batch = 2, .side = 64});
+  const Weights after = weights_of(model / "vae");
+  EXPECT_TRUE(after.encoder.equal(before.encoder));  // and so the latents
+  EXPECT_FALSE(after.decoder.equal(before.decoder));
+  const auto finished = [&] { return std::stoll(read_text_file(work / "adversarial.step")); };
+  const auto first_finished = finished();
+  train_adversarially(work, model, {.run = run, .batch = 2, .side = 64});
+  EXPECT_GT(finished(), first_finished);
 
   diffusion::ModelPaths paths;
   paths.model = model;

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "adversarial_training.h"
 #include "console/console_progress.h"
 #include "console/numbers.h"
 #include "console/program.h"
+#include "decoder_data.h"
 #include "denoiser_training.h"
 #include "mini_data/plan.h"
 #include "samples.h"
@@ -62,6 +64,15 @@ void train_the_vae(const Arguments& a) {
   options.device = a.device();
   if (a.batch > 0) options.batch = a.batch;
   train_vae(a.work, a.model, options);
+}
+
+void train_the_decoder(const Arguments& a) {
+  AdversarialTraining options;
+  options.run = begun_training(a);
+  options.run.warm_up_steps = 50;
+  options.device = a.device();
+  if (a.batch > 0) options.batch = a.batch;
+  train_adversarially(a.work, a.model, options);
 }
 
 void train_the_denoiser(const Arguments& a) {
@@ -129,6 +140,15 @@ void add_data_commands(CLI::App& program, Arguments& a) {
   add_folders(latents, a);
   add_device(latents, a);
   latents.callback([&a] { encode_latents(a.work, a.model, a.device()); });
+
+  CLI::App& decoder_data = *program.add_subcommand(
+      "decoder-data", "Encode samples and edit them with the model as it is, for vae-adversarial");
+  add_folders(decoder_data, a);
+  decoder_data.add_option("--count", a.num_samples, "Samples, at most")
+      ->check(tools::whole_number(1))
+      ->capture_default_str();
+  add_seed(decoder_data, a);
+  decoder_data.callback([&a] { make_decoder_data(a.work, a.model, a.num_samples, a.run.seed); });
 }
 
 void add_training_commands(CLI::App& program, Arguments& a) {
@@ -137,6 +157,12 @@ void add_training_commands(CLI::App& program, Arguments& a) {
   add_batch(vae, a);
   vae.add_flag("--decoder-only", a.decoder_only, "The encoder, and so the latents, stay as they are");
   vae.callback([&a] { train_the_vae(a); });
+
+  CLI::App& decoder = *program.add_subcommand(
+      "vae-adversarial", "Finish the autoencoder's decoder against a discriminator; the latents stay");
+  add_training(decoder, a);
+  add_batch(decoder, a);
+  decoder.callback([&a] { train_the_decoder(a); });
 
   CLI::App& words = *program.add_subcommand(
       "words", "Teach the text encoder what words look like: a minute; refused once there is a text encoder");

@@ -134,7 +134,8 @@ at::Tensor Parameters::find(const std::string& name, at::IntArrayRef expected, a
   const auto found = index_.find(name);
   const Entry& entry = found != index_.end() ? entries_[found->second]
                                              : add(name, initial(name, expected, seed_ + entries_.size()));
-  return (use_average_ ? entry.average : entry.value).to(type);
+  const at::Tensor& chosen = use_average_ ? entry.average : entry.value;
+  return (record_gradients_ ? chosen : chosen.detach()).to(type);
 }
 
 std::vector<std::string> Parameters::names() const {

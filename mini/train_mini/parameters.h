@@ -30,6 +30,8 @@ class Parameters final : public nn::WeightSource {
 
   /// While true, find() gives the moving average, without gradients.
   void use_average(bool on) { use_average_ = on; }
+  /// While false, find() gives values through which no gradients reach the leaves.
+  void record_gradients(bool on) { record_gradients_ = on; }
 
   /// A value before the first step, and another in its place.
   at::Tensor start_of(const std::string& name) const;
@@ -69,7 +71,7 @@ class Parameters final : public nn::WeightSource {
   std::string name_;
   uint64_t seed_;
   c10::Device device_;
-  bool use_average_ = false;
+  bool use_average_ = false, record_gradients_ = true;
   std::vector<Entry> entries_;
   std::map<std::string, size_t> index_;
 };
