@@ -23,6 +23,7 @@
 #include "train_mini/parameters.h"
 #include "train_mini/samples.h"
 #include "train_mini/vae_training.h"
+#include "train_mini/variogram.h"
 #include "train_mini/words_training.h"
 #include "train_mini/workers.h"
 
@@ -180,6 +181,29 @@ TEST(Discriminator, slope_penalty_is_the_square_of_finite_differences) {
     return slope_penalty(discriminator, grain.clone()).item<double>();
   };
   EXPECT_NEAR(penalty(), expected, 0.02 * expected);
+}
+
+TEST(Variogram, knows_white_noise_and_the_direction_of_stripes) {
+  at::manual_seed(3);
+  // Differences of independent values have twice their variance, at any distance and in any direction.
+  const at::Tensor noise = 0.1 * at::randn({1, 3, 136, 136});
+  const at::Tensor of_light = variogram(noise, 128).view({12, 3}).select(1, 0);
+  EXPECT_LT((of_light / (2 * 0.01 / 3) - 1).abs().max().item<float>(), 0.1f);
+
+  const at::Tensor stripes = (at::arange(64) % 2).to(at::kFloat).expand({1, 3, 64, 64});
+  const at::Tensor of_stripes = variogram(stripes, 32).select(2, 0).select(2, 0).view({12, 3}).select(1, 0);
+  const at::Tensor one_apart = of_stripes.slice(0, 0, 4), two_apart = of_stripes.slice(0, 4, 8);
+  EXPECT_TRUE(one_apart.equal(at::tensor({1.0f, 0.0f, 1.0f, 1.0f}))) << one_apart;
+  EXPECT_TRUE(two_apart.equal(at::zeros({4})));
+}
+
+TEST(Variogram, error_asks_for_the_same_grain_in_any_place) {
+  at::manual_seed(5);
+  const at::Tensor noise = 0.1 * at::randn({1, 3, 72, 72}), other = 0.1 * at::randn({1, 3, 72, 72});
+  EXPECT_EQ(variogram_error(noise, noise, 64).item<double>(), 0);
+  EXPECT_LT(variogram_error(noise, other, 64).item<double>(), 0.02);
+  // Of a quarter of the energy the logarithm, less half of what is quadratic.
+  EXPECT_NEAR(variogram_error(0.5 * noise, noise, 64).item<double>(), std::log(4) - 0.35, 0.05);
 }
 
 // Pictures of coloured bands: little, but something that can be learnt.

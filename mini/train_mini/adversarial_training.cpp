@@ -17,6 +17,7 @@
 #include "parameters.h"
 #include "patina/base/files.h"
 #include "patina/diffusion/networks/vae.h"
+#include "variogram.h"
 #include "workers.h"
 
 namespace patina::train_mini {
@@ -27,32 +28,18 @@ using diffusion::Vae;
 
 // A mean of absolute differences pulls at a picture with a force of one in all; the other losses, whose
 // slopes are steeper, are weighted to pull about as much.
-constexpr double kColourWeight = 1, kPixelWeight = 0.1, kEnergyWeight = 0.02, kAdversarialWeight = 0.1,
+constexpr double kColourWeight = 1, kPixelWeight = 0.1, kGrainWeight = 0.04, kAdversarialWeight = 0.3,
                  kFeatureWeight = 0.1;
-constexpr double kPenalty = 4;      // γ of R1 [Mescheder2018], a patch
-constexpr double kAverage = 0.995;  // of a training of a few thousand steps
+constexpr double kPenalty = 1;            // γ of R1 [Mescheder2018], a patch
+constexpr double kDiscriminatorRate = 2;  // times the decoder's
+constexpr double kAverage = 0.995;        // of a training of a few thousand steps
 constexpr double kCheckpointSeconds = 480;
 constexpr int64_t kHeldOutPictures = 8;
-// Windows over which energies are compared. Denoised latents show the same material in another place.
+// Windows over which variograms are compared. Denoised latents show the same material in another place.
 constexpr int64_t kEncodedWindow = 16, kDenoisedWindow = 32;
 
 at::Tensor pooled_error(const at::Tensor& difference, int64_t block) {
   return at::avg_pool2d(difference, block).abs().mean();
-}
-
-/// How far energies in windows are from the true ones: mean |log| of their ratio over both octaves, quadratic
-/// below a factor of two so that right energies are left alone. Below a step of a byte all is flat.
-at::Tensor energy_error(const at::Tensor& decoded, const at::Tensor& pictures, int64_t window) {
-  constexpr double kFlat = 4.0 / (255 * 255), kQuadraticBelow = 0.7;
-  const auto log_energy = [&](const at::Tensor& energy) {
-    return at::log(at::avg_pool2d(energy, window, window / 2) + kFlat);
-  };
-  const auto error = [&](const at::Tensor& drawn, const at::Tensor& wanted) {
-    return at::smooth_l1_loss(log_energy(drawn), log_energy(wanted), at::Reduction::Mean, kQuadraticBelow);
-  };
-  const mini_data::FineEnergy drawn = mini_data::fine_energy(decoded);
-  const mini_data::FineEnergy wanted = mini_data::fine_energy(pictures);
-  return 0.5 * (error(drawn.finest, wanted.finest) + error(drawn.both, wanted.both));
 }
 
 /// Mean |difference| of the features' means over windows of 16 pixels.
@@ -97,11 +84,11 @@ struct Step {
     const at::Tensor colour = pooled_error(difference, block) + pooled_error(difference, block / 2) +
                               (at::avg_pool2d(from_denoised, block) - batch.colours).abs().mean();
     const at::Tensor pixel = difference.abs().mean();
-    const at::Tensor energy = energy_error(from_encoded, batch.pictures, kEncodedWindow) +
-                              energy_error(from_denoised, batch.pictures, kDenoisedWindow);
+    const at::Tensor grain = variogram_error(from_encoded, batch.pictures, kEncodedWindow) +
+                             variogram_error(from_denoised, batch.pictures, kDenoisedWindow);
     const at::Tensor adversarial = at::softplus(-drawn.scores).mean();
     const at::Tensor feature = feature_error(drawn_from_encoded, wanted, side);
-    (share * (kColourWeight * colour + kPixelWeight * pixel + kEnergyWeight * energy +
+    (share * (kColourWeight * colour + kPixelWeight * pixel + kGrainWeight * grain +
               kAdversarialWeight * adversarial + kFeatureWeight * feature))
         .backward();
 
@@ -114,7 +101,7 @@ struct Step {
     means["slope"] = slope.item<double>();
     means["colour"] = colour.item<double>();
     means["pixel"] = pixel.item<double>();
-    means["energy_error"] = energy.item<double>();
+    means["grain"] = grain.item<double>();
     means["energy_encoded"] = mean_energy(from_encoded) / wanted_energy;
     means["energy_denoised"] = mean_energy(from_denoised) / wanted_energy;
     means["feature"] = feature.item<double>();
@@ -217,11 +204,11 @@ void train_adversarially(const fs::path& work, const fs::path& model, const Adve
     optimizer.beta1 = 0.5;
     optimizer.weight_decay = 0;
     optimizer.average = kAverage;
-    optimizer.rate = run.rate();
     for (Parameters* parameters : {&decoder, &judge}) {
       const double norm = parameters->gradient_norm();
       means[parameters->where() + "_gradient"] = norm;
       if (parameters == &decoder && norm > 1) decoder.scale_gradients(1 / norm);
+      optimizer.rate = run.rate() * (parameters == &judge ? kDiscriminatorRate : 1);
       if (std::isfinite(norm)) parameters->step(optimizer, run.step());
     }
     run.log(means);
