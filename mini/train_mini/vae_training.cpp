@@ -10,6 +10,7 @@
 #include <random>
 
 #include <ATen/ATen.h>
+#include <c10/core/GradMode.h>
 #include <c10/core/InferenceMode.h>
 #include <nlohmann/json.hpp>
 
@@ -139,9 +140,12 @@ void train_vae(const fs::path& work, const fs::path& model, const VaeTraining& o
     std::map<std::string, double> means;
     in_shares(options.run.workers, x.size(0), [&](int64_t begin, int64_t end) {
       const at::Tensor pictures = x.slice(0, begin, end);
-      const diffusion::Posterior posterior = vae.encode(pictures);
-      at::Tensor latents = posterior.mean + at::exp(0.5 * posterior.logvar) * noise.slice(0, begin, end);
-      if (options.decoder_only) latents = latents.detach();
+      const diffusion::Posterior posterior = [&] {
+        const c10::AutoGradMode records(!options.decoder_only);
+        return vae.encode(pictures);
+      }();
+      const at::Tensor latents =
+          posterior.mean + at::exp(0.5 * posterior.logvar) * noise.slice(0, begin, end);
       const at::Tensor difference = vae.decode(latents) - pictures;
       const at::Tensor kl =
           0.5 * (posterior.mean.square() + at::exp(posterior.logvar) - 1 - posterior.logvar).mean();
