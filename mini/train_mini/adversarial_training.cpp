@@ -28,7 +28,7 @@ using diffusion::Vae;
 
 // A mean of absolute differences pulls at a picture with a force of one in all; the other losses, whose
 // slopes are steeper, are weighted to pull about as much.
-constexpr double kColourWeight = 1, kPixelWeight = 0.1, kGrainWeight = 0.04, kAdversarialWeight = 0.3,
+constexpr double kColourWeight = 1, kPixelWeight = 0.1, kGrainWeight = 0.1, kAdversarialWeight = 0.3,
                  kFeatureWeight = 0.1;
 constexpr double kPenalty = 1;            // γ of R1 [Mescheder2018], a patch
 constexpr double kDiscriminatorRate = 2;  // times the decoder's
