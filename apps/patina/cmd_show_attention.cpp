@@ -47,7 +47,7 @@ void add_show_attention(CLI::App& program) {
       ->group("What is shown");
   using namespace pipeline;
   const auto given = add_options(*command, "ASSET", "The asset: .glb, .gltf or .obj.",
-                                 kInputs | kRender | kEdit | kMachine, {"material", "seeds"});
+                                 kInputs | kRender | kEdit | kMachine, {"material", "seeds", "exemplar"});
   command->callback([=] {
     find_positional(*given);
     pipeline::Config config;

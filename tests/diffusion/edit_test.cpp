@@ -94,6 +94,35 @@ TEST(Detail, parts_with_the_prompt_s_own_words_change_nothing_and_others_do) {
   EXPECT_THROW(run(inputs, options), Error);
 }
 
+TEST(Detail, an_exemplar_that_no_pixel_looks_at_changes_nothing_and_a_weightier_one_more) {
+  EditInputs inputs = made_inputs(2, 64);
+  const EditOptions options = short_options();
+  const std::vector<Image> plain = run(inputs, options);
+  Image picture(64, 64, 3);
+  for (size_t i = 0; i < picture.pixels.size(); ++i)
+    picture.pixels[i] = i % 3 == 0 ? 0.9f : 0.1f + 0.2f * static_cast<float>(i % 7 == 0);
+  inputs.exemplars.push_back({picture, std::vector<Image>(4, Image(64, 64, 1, 0.0f))});
+  EXPECT_EQ(max_difference(plain[0], run(inputs, options)[0]), 0);
+  double last = 0;
+  for (const float weight : {0.05f, 1.0f}) {
+    inputs.exemplars[0].view_weights.assign(4, Image(64, 64, 1, weight));
+    const double moved = max_difference(plain[0], run(inputs, options)[0]);
+    EXPECT_GT(moved, last + 1e-3);
+    last = moved;
+  }
+
+  std::vector<Checkpoint> checkpoints;
+  EditHooks keep;
+  keep.on_checkpoint = [&](const Checkpoint& checkpoint) { checkpoints.push_back(checkpoint); };
+  const std::vector<Image> whole = run(inputs, options, keep);
+  EditHooks resume;
+  resume.resume = checkpoints[1];
+  EXPECT_EQ(max_difference(whole[0], run(inputs, options, resume)[0]), 0);
+
+  inputs.exemplars[0].picture = Image(32, 64, 3);
+  EXPECT_THROW(run(inputs, options), Error);
+}
+
 TEST(Detail, a_resumed_run_gives_the_same_bytes) {
   const EditInputs inputs = made_inputs(2, 64);
   for (const Scheduler scheduler : {Scheduler::kUniPc, Scheduler::kPndm, Scheduler::kEulerAncestral}) {

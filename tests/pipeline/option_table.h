@@ -23,6 +23,7 @@ inline const std::vector<OptionCase> kOptionCases{
     {"negative-prompt", {"shiny"}, kFromEdit},
     {"prompt-for", {"enamel=moss"}, kFromEdit},
     {"negative-prompt-for", {"enamel=shiny"}, kFromEdit},
+    {"exemplar", {"FILE:mask.png"}, kFromEdit},
     {"strength", {"1"}, kFromEdit},
     {"guidance-scale", {"3"}, kFromEdit},
     {"steps", {"4"}, kFromEdit},

@@ -27,6 +27,12 @@ struct EditInputs {
                                            // has a strength (late_join.h); empty: 1 everywhere
   std::vector<Image> part_views = {};  // grid² × [H,W,parts] [0,1]: how much of each pixel shows each part
                                        // of EditOptions::part_prompts; the rest follows the prompt
+  struct Exemplar {
+    Image picture;                    // [H,W,3] sRGB of a view's size
+    std::vector<Image> view_weights;  // grid² × [H,W,1], 0 or more: how much a pixel looks at it: 1 is
+                                      // as much as at all views together
+  };
+  std::vector<Exemplar> exemplars = {};  // pictures that the edit shall be like (networks/reference.h)
 };
 
 /// Where a run stands between two steps, as bytes that restore it exactly; for resuming a killed run.

@@ -70,6 +70,12 @@ GridSizes checked_sizes(const Model& model, const EditInputs& inputs, const Edit
     check_views(inputs.*kind.views, std::string(kind.name) + " views", sizes);
   if (!inputs.start_views.empty()) check_views(inputs.start_views, "start views", sizes);
   if (!inputs.strength_views.empty()) check_views(inputs.strength_views, "strength views", sizes, 1);
+  for (const EditInputs::Exemplar& exemplar : inputs.exemplars) {
+    if (exemplar.picture.width != sizes.view_width || exemplar.picture.height != sizes.view_height)
+      usage("exemplar", "is " + size_text(exemplar.picture.width, exemplar.picture.height) + ", expected " +
+                            size_text(sizes.view_width, sizes.view_height) + ", the size of a view");
+    check_views(exemplar.view_weights, "exemplar weights", sizes, 1);
+  }
   if (!options.part_prompts.empty())
     check_views(inputs.part_views, "part views", sizes, static_cast<int>(options.part_prompts.size()));
   const int64_t noise_size =
@@ -146,6 +152,31 @@ at::Tensor latent_shares(const std::vector<Image>& part_views, const GridSizes& 
   return at::cat({at::clamp_min(1 - parts.sum(0, /*keepdim=*/true), 0), parts});
 }
 
+/// What the denoiser needs of the exemplars; their noise follows from the seed.
+std::vector<DenoiserReference> references_of(const Model::State& networks, const EditInputs& inputs,
+                                             const EditOptions& options, const GridSizes& sizes,
+                                             const Progress& progress) {
+  std::vector<DenoiserReference> references;
+  for (const EditInputs::Exemplar& exemplar : inputs.exemplars) {
+    std::vector<at::Tensor> weights;
+    for (const Image& view : exemplar.view_weights)
+      weights.push_back(
+          at::adaptive_avg_pool2d(tensor_from_image(view), {sizes.latent_height, sizes.latent_width}));
+    // An exemplar is as large as one view and shall count like all of them.
+    const auto as_views = static_cast<double>(sizes.grid * sizes.grid);
+    std::vector<float> x0 = start_latents(*networks.vae.use(), {exemplar.picture}, 1, progress);
+    std::vector<float> noise =
+        scheduler_noise(options.seed, -1 - static_cast<int>(references.size()), x0.size());
+    references.push_back(
+        {std::move(x0),
+         std::move(noise),
+         {1, networks.vae.config().latent_channels, sizes.latent_height, sizes.latent_width},
+         encode_texts(networks, options.prompt, {1, {}}, options.clip_skip),
+         ReferenceWeights(as_views * tile(weights, sizes.grid)[0][0], networks.unet.config().levels.size())});
+  }
+  return references;
+}
+
 }  // namespace
 
 at::Tensor tensor_from_image(const Image& image) {
@@ -217,6 +248,7 @@ std::unique_ptr<EditRun> start_edit(const Model& model, const EditInputs& inputs
                    options.bias_controlnet};
   run->denoiser.part_texts = std::move(part_texts);
   run->denoiser.part_levels = std::move(part_levels);
+  run->denoiser.references = references_of(networks, inputs, options, sizes, progress);
 
   // Where each latent pixel joins; without strengths all do so at the start.
   std::vector<int> calls;

@@ -19,7 +19,8 @@ std::span<const float> values_of(const at::Tensor& tensor) {
 
 }  // namespace
 
-Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
+Guided Denoiser::operator()(const at::Tensor& latents, double timestep,
+                            std::span<const at::Tensor> noised) const {
   PATINA_CHECK(text.tokens.size(0) == (guidance_scale == 1 ? 1 : 2));
   const at::Tensor timesteps = at::full({1}, timestep, at::kFloat);
   std::vector<NetworkInputs> evaluations;
@@ -33,6 +34,14 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
     for (size_t i = 0; i < evaluations.size(); ++i) evaluations[i].part_texts.push_back(groups[i]);
   }
 
+  // What the references' self-attentions see; the evaluation without the prompt does without.
+  PATINA_CHECK_EQ(noised.size(), references.size());
+  std::vector<ReferenceTokens> tokens(references.size());
+  for (size_t i = 0; i < references.size(); ++i) {
+    (*unet)({noised[i], timesteps, references[i].text}, {}, record_reference(tokens[i]));
+    evaluations.back().references.push_back({&tokens[i], &references[i].weights});
+  }
+
   // ControlNets outside: with little memory each is read from its file for this loop.
   std::vector<ControlResiduals> residuals(evaluations.size());
   for (const Control& control : controls) {
@@ -41,6 +50,7 @@ Guided Denoiser::operator()(const at::Tensor& latents, double timestep) const {
     for (size_t i = 0; i < evaluations.size(); ++i) {
       NetworkInputs inputs = evaluations[i];
       if (!bias_controls) inputs.bias = nullptr;
+      inputs.references.clear();
       residuals[i] = sum(std::move(residuals[i]), (*network)(inputs, control.hint, control.scale));
     }
   }
@@ -61,8 +71,15 @@ std::vector<float> sample(const Denoiser& denoiser, const SchedulePlan& plan, Sa
     const int index = state.next_call;
     if (callbacks.late) hold_latents(*callbacks.late, plan, index, state.latents);
     std::vector<float> input = scale_model_input(plan, index, state.latents);
-    const Guided prediction =
-        denoiser(at::from_blob(input.data(), shape, at::kFloat), plan.timesteps[static_cast<size_t>(index)]);
+    std::vector<std::vector<float>> references;
+    std::vector<at::Tensor> noised;
+    for (const DenoiserReference& reference : denoiser.references) {
+      references.push_back(
+          scale_model_input(plan, index, add_noise(plan, index, reference.x0, reference.noise)));
+      noised.push_back(at::from_blob(references.back().data(), reference.shape, at::kFloat));
+    }
+    const Guided prediction = denoiser(at::from_blob(input.data(), shape, at::kFloat),
+                                       plan.timesteps[static_cast<size_t>(index)], noised);
     const std::vector<float> noise =
         needs_noise(plan, index) ? callbacks.noise(index, state.latents.size()) : std::vector<float>{};
     std::vector<float> held;

@@ -22,6 +22,14 @@ struct Control {
   float scale = 1;
 };
 
+/// A picture that the views' self-attention sees too.
+struct DenoiserReference {
+  std::vector<float> x0, noise;  // [C,h,w] its latents, and the noise that they are under
+  std::vector<int64_t> shape;    // [1,C,h,w]
+  TextConditioning text;         // of one prompt
+  ReferenceWeights weights;      // of the views' latent pixels
+};
+
 /// What the network says about one latent.
 struct Guided {
   at::Tensor unconditional, conditional;  // [1,C,H,W] f32; without guidance both are `guided`
@@ -40,9 +48,11 @@ struct Denoiser {
   nn::Recorder record = {};                       // listens to the U-Net
   std::vector<TextConditioning> part_texts = {};  // likewise, of the parts that have words of their own
   std::optional<PartLevels> part_levels = std::nullopt;  // where these act; nullopt: there are none
+  std::vector<DenoiserReference> references = {};
 
-  /// latents [1,C,H,W] f32, scaled as the scheduler asks.
-  Guided operator()(const at::Tensor& latents, double timestep) const;
+  /// latents [1,C,H,W] f32, scaled as the scheduler asks; `noised`: those of the references, likewise.
+  Guided operator()(const at::Tensor& latents, double timestep,
+                    std::span<const at::Tensor> noised = {}) const;
 };
 
 /// Where a run stands between two steps.

@@ -39,11 +39,19 @@ struct SelfAttentionBias {
   LevelBias at(int64_t height, int64_t width, int64_t head_dim) const;
 };
 
+/// Keys and values of another picture, which queries see beside their own.
+struct ExtraKeys {
+  at::Tensor k, v;        // [B,M,heads·d]
+  at::Tensor log_weight;  // f32, broadcast to [B,1,N]: added to a query's scores of these keys; 0: they count
+                          // like its own, -inf: not at all
+};
+
 /// softmax(q kᵀ/√d + β[j ∈ S_i]) v for q [B,N,heads·d], k and v [B,M,heads·d] -> [B,N,heads·d]; one dtype,
 /// f32 or bf16, on CUDA fp16 too. With a bias N = M = its number of pixels, and on CUDA d is a multiple of 8
 /// up to 256, the dtype bf16 or fp16 and β at least -1. Memory beyond the result is O(N + M). Where gradients
-/// are recorded there must be no bias, and memory may be O(N M).
+/// are recorded there must be no bias and no extra keys, and memory may be O(N M). `extra`: the softmax is
+/// over their keys too.
 at::Tensor attend(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
-                  const LevelBias& bias = {});
+                  const LevelBias& bias = {}, std::span<const ExtraKeys> extra = {});
 
 }  // namespace patina::nn

@@ -181,15 +181,25 @@ void add_bias(const DenseResult& dense, const at::Tensor& q, const at::Tensor& k
 }
 
 at::Tensor attend_cuda(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
-                       const LevelBias& bias) {
+                       const LevelBias& bias, std::span<const ExtraKeys> extra) {
   const c10::cuda::CUDAGuard guard(q.device());
   const int64_t head_dim = q.size(2) / num_heads;
   const float scale = 1.0f / std::sqrt(static_cast<float>(head_dim));
   const at::Tensor heads_q = split_heads(on_16_bytes(q), num_heads),
                    heads_k = split_heads(on_16_bytes(k), num_heads),
                    heads_v = split_heads(on_16_bytes(v), num_heads);
-  const DenseResult dense =
-      dense_attention(dense_kernel_for(q.scalar_type(), head_dim), heads_q, heads_k, heads_v, scale);
+  const DenseKernel kernel = dense_kernel_for(q.scalar_type(), head_dim);
+  DenseResult dense = dense_attention(kernel, heads_q, heads_k, heads_v, scale);
+  // Before the bias, which is a correction of what all keys give together.
+  for (const ExtraKeys& keys : extra) {
+    const DenseResult other = dense_attention(kernel, heads_q, split_heads(on_16_bytes(keys.k), num_heads),
+                                              split_heads(on_16_bytes(keys.v), num_heads), scale);
+    const at::Tensor log_sum_exp = other.log_sum_exp + keys.log_weight.to(q.device());
+    const at::Tensor share = at::sigmoid(log_sum_exp - dense.log_sum_exp).unsqueeze(3);
+    dense.out =
+        at::lerp(dense.out.to(at::kFloat), other.out.to(at::kFloat), share).to(q.scalar_type()).contiguous();
+    dense.log_sum_exp = at::logaddexp(dense.log_sum_exp, log_sum_exp).contiguous();
+  }
   if (bias.buckets && bias.beta != 0) {
     const int64_t num_pixels = bias.buckets->num_pixels();
     if (q.size(1) != num_pixels || k.size(1) != num_pixels)

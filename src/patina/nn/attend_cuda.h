@@ -12,7 +12,7 @@ namespace patina::nn {
 
 /// attend() of tensors on one CUDA device; its arguments are checked there. Runs on the current stream.
 at::Tensor attend_cuda(const at::Tensor& q, const at::Tensor& k, const at::Tensor& v, int64_t num_heads,
-                       const LevelBias& bias);
+                       const LevelBias& bias, std::span<const ExtraKeys> extra);
 
 /// attention::cuda::BiasTiles in device memory.
 struct DeviceTiles {

@@ -10,6 +10,7 @@
 #include "patina/base/text.h"
 #include "patina/diffusion/model.h"
 #include "patina/pipeline/blend.h"
+#include "patina/pipeline/exemplars.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/part_prompts.h"
 #include "patina/pipeline/variants.h"
@@ -37,7 +38,9 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
   check_export(bench, config.output, progress);
   const Strength strength = mask_stage(bench, config.masks, run, progress);  // → masks/
-  part_prompts(bench, strength, config.edit);  // refuses what is wrong with them before anything is rendered
+  // Refuse what is wrong with them before anything is rendered.
+  part_prompts(bench, strength, config.edit);
+  read_exemplars(bench, strength, config.edit);
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
   if (only_edits(config)) return edit_variants(bench, strength, views, config, model, run, progress);
   const std::vector<Image> edited =

@@ -101,6 +101,16 @@ std::vector<Option> edit_options() {
            .help = "What one material should not look like, in place of the --negative-prompt.",
            .default_text = "none"},
           text(), [](auto& s) -> auto& { return s.negative_prompt_for; }),
+      list_option(
+          at,
+          {.name = "exemplar",
+           .placeholder = "[MATERIAL=]FILE[:W]",
+           .help = "Pictures that the edit shall be like, for all of the asset or for one material: "
+                   "photographs, textures, or another asset, whose base colour is taken. The weight, above 0 "
+                   "up to 100, says how much the views look at it: 1, the usual, as much as at all views "
+                   "together.",
+           .default_text = "none"},
+          text(), [](auto& s) -> auto& { return s.exemplars; }),
       option(
           at,
           {.name = "strength",

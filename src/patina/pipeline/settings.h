@@ -41,6 +41,7 @@ struct EditSettings {
   diffusion::Device device = diffusion::Device::kAuto;
   bool low_memory = false;
   correspond::NoiseMode noise = correspond::NoiseMode::kExact;
+  std::vector<std::string> exemplars;                        // "[MATERIAL=]FILE[:WEIGHT]", see exemplars.h
   std::vector<std::string> prompt_for, negative_prompt_for;  // "MATERIAL=TEXT", see part_prompts.h
   diffusion::EditOptions options{.bias_weight = 1.8f};  // docs/decisions/0012; the initial noise has its seed
 };

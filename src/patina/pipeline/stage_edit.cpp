@@ -10,6 +10,7 @@
 #include "patina/correspond/correspondences.h"
 #include "patina/correspond/noise.h"
 #include "patina/image/image_io.h"
+#include "patina/pipeline/exemplars.h"
 #include "patina/pipeline/part_prompts.h"
 #include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
@@ -24,12 +25,10 @@ namespace {
 
 std::string edit_key(const Workbench& bench, const Strength& strength, const RenderedViews& views,
                      const EditSettings& settings, const ResolvedModel& model) {
-  return StageKey(bench, settings)
-      .add(views.tile)
-      .add(views.normal)
-      .add_strength(strength)
-      .add(model.hash())
-      .hash();
+  StageKey key(bench, settings);
+  key.add(views.tile).add(views.normal).add_strength(strength).add(model.hash());
+  for (const Exemplar& exemplar : read_exemplars(bench, strength, settings)) key.add(exemplar.hash);
+  return key.hash();
 }
 
 // The view whose noise is farthest from white tells whether the noise can be trusted.
@@ -136,7 +135,8 @@ PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, cons
                      .noise = std::move(noise),
                      .bias_levels = {},
                      .strength_views = strength.views,
-                     .part_views = part_views(parts, views.set)};
+                     .part_views = part_views(parts, views.set),
+                     .exemplars = exemplar_inputs(read_exemplars(bench, strength, settings), views.set)};
   if (settings.options.bias_weight != 0) {
     start = Clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
@@ -187,12 +187,19 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
       result.outputs.push_back(numbered("detail/parts", v, ".png"));
       write_image(run.file(result.outputs.back()), parts[v]);
     }
+    json shown = json::array();  // what the report says of the exemplars
+    for (size_t i = 0; i < prepared.inputs.exemplars.size(); ++i) {
+      result.outputs.push_back(numbered("detail/exemplar", i, ".png"));
+      write_image(run.file(result.outputs.back()), prepared.inputs.exemplars[i].picture);
+      shown.push_back({{"file", result.outputs.back()}, {"caption", settings.exemplars[i]}});
+    }
     const diffusion::Guidance guidance = diffusion::guidance_of(model, options);
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model.latent_channels());
     result.metrics = {
         {"noise", prepared.noise_metrics},
         {"model", model.description()},
         {"prompt", options.prompt},
+        {"exemplars", shown},
         {"parts", parts_as_json(part_prompts(bench, strength, settings), bench)},
         {"guidance", {{"scale", guidance.scale}, {"negative_prompt", guidance.negative_prompt}}},
         {"latent_pixels", latent_pixels},

@@ -103,8 +103,9 @@ void visit(const MaskSettings& s, Visitor& visitor) {
 }
 template <class Visitor>
 void visit(const EditSettings& s, Visitor& visitor) {
-  const auto& [model, dtype, device, low_memory, noise, prompt_for, negative_prompt_for, options] = s;
-  visitor(model, dtype, device, low_memory, noise, prompt_for, negative_prompt_for, options);
+  const auto& [model, dtype, device, low_memory, noise, exemplars, prompt_for, negative_prompt_for, options] =
+      s;
+  visitor(model, dtype, device, low_memory, noise, exemplars, prompt_for, negative_prompt_for, options);
 }
 template <class Visitor>
 void visit(const FitSettings& s, Visitor& visitor) {

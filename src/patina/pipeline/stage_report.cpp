@@ -175,6 +175,17 @@ std::vector<report::PartWords> part_words(const RunFolder& run) {
   return words;
 }
 
+std::vector<report::ExemplarPicture> exemplar_pictures(const Workbench& bench, const RunFolder& run) {
+  std::vector<report::ExemplarPicture> pictures;
+  const StageRecord* edit = run.stage("detail");
+  if (!edit) return pictures;
+  for (const json& exemplar : edit->metrics.value("exemplars", json::array()))
+    pictures.push_back(
+        {exemplar.at("caption"), read_rgb_sized(run.file(exemplar.at("file").get<std::string>()),
+                                                bench.cameras[0].width, bench.cameras[0].height)});
+  return pictures;
+}
+
 // What the page says the run was asked for: config.json, as `patina` writes it.
 json asked_for(const RunFolder& run) {
   const json config = read_json(run.file("config.json"));
@@ -210,6 +221,7 @@ void report_stage(const Workbench& bench, const Strength& strength, const Render
   page.relit = relit_pictures(bench, lights, run);
   page.masks = mask_pictures(bench, strength);
   page.strength = strength.views;
+  page.exemplars = exemplar_pictures(bench, run);
   page.parts = part_words(run);
   if (!page.parts.empty()) page.part_views = read_numbered(run, "detail/parts", bench.cameras);
   page.viewer = viewer(bench, fitted, lights, record.metrics.at("relight"), views.set.exposure_ev);

@@ -190,6 +190,7 @@ void write_report(const std::filesystem::path& path, const ReportData& data) {
   if (!data.viewer.empty()) html += kViewerMarkup;
   html += turntable(path, data);
   html += other_light(data.relit, data.metrics);
+  html += exemplars(data.exemplars);
   html += parts(data.parts, data.part_views);
   html += where(data.masks, data.strength);
   html += views(data);

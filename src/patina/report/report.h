@@ -12,6 +12,7 @@
 #include "patina/image/image.h"
 #include "patina/render/path_tracer.h"
 #include "patina/render/scene.h"
+#include "patina/report/exemplars.h"
 #include "patina/report/other_light.h"
 #include "patina/report/parts.h"
 #include "patina/report/where.h"
@@ -44,6 +45,7 @@ struct ReportData {
   std::vector<RelitPictures> relit;
   std::vector<MaskPicture> masks;
   std::vector<Image> strength;  // of the masks, one a view (where.h); empty: none
+  std::vector<ExemplarPicture> exemplars;
   std::vector<PartWords> parts;
   std::vector<Image> part_views;  // one a view (parts.h); empty: none
   std::vector<float> loss;

@@ -22,12 +22,15 @@ std::string row(const std::string& name, const std::vector<Image>& views) {
 
 void write_variants(const std::filesystem::path& path, const VariantsPage& page) {
   std::string html = page_begin(page.title);
-  html += page_heading("patina, edits to choose from", page.title, page.prompt, page.negative_prompt,
-                       {fmt::format("<b>{}</b> edits", page.variants.size()),
-                        fmt::format("<b>{}</b> views", page.before.size())});
+  html += page_heading(
+      "patina, edits to choose from", page.title, page.prompt, page.negative_prompt,
+      {fmt::format("<b>{}</b> edit{}", page.variants.size(), page.variants.size() == 1 ? "" : "s"),
+       fmt::format("<b>{}</b> views", page.before.size())});
   html +=
-      "<p class=\"lead\">These are the edited views; textures are made of one row. Run the same command "
-      "again for one edit, with the seed that you like as the edit’s own: that edit is kept.</p>\n";
+      "<section>\n<p class=\"lead\">These are the edited views; textures are made of one row. Run the same "
+      "command "
+      "again for one edit, with the seed that you like as the edit’s own: that edit is "
+      "kept.</p>\n</section>\n";
   for (const VariantsPage::Variant& variant : page.variants) html += row(variant.name, variant.edited);
   html += row("Before", page.before);
   html += page_end();

@@ -1,6 +1,7 @@
 #include "patina/diffusion/networks/blocks.h"
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <ATen/ATen.h>
@@ -62,9 +63,9 @@ ResnetBlock load_resnet(nn::WeightReader& weights, const std::string& name, int6
 }
 
 at::Tensor Attention::operator()(const at::Tensor& x, const at::Tensor& context, const nn::Recorder& record,
-                                 const nn::LevelBias& bias) const {
+                                 const nn::LevelBias& bias, std::span<const nn::ExtraKeys> extra) const {
   const at::Tensor q = to_q(x, record), k = to_k(context, record), v = to_v(context, record);
-  return record(name, to_out_0(nn::attend(q, k, v, num_heads, bias), record));
+  return record(name, to_out_0(nn::attend(q, k, v, num_heads, bias, extra), record));
 }
 
 at::Tensor Attention::in_parts(const at::Tensor& x, std::span<const at::Tensor> texts,
@@ -99,7 +100,15 @@ at::Tensor TransformerBlock::operator()(const at::Tensor& x, int64_t height, int
       conditions.bias ? conditions.bias->at(height, width, x.size(2) / attn1.num_heads) : nn::LevelBias{};
 
   const at::Tensor n1 = norm1(x, record);
-  at::Tensor h = x + attn1(n1, n1, record, bias);
+  std::vector<nn::ExtraKeys> extra;
+  for (const Reference& reference : conditions.references) {
+    const at::Tensor tokens = reference.tokens->at(norm1.name).expand({x.size(0), -1, -1});
+    // Only the last of the batch, the prompt's, sees it: guidance then leads toward it.
+    at::Tensor weight = reference.weights->log_at(height, width).repeat({x.size(0), 1, 1});
+    if (x.size(0) > 1) weight.slice(0, 0, x.size(0) - 1).fill_(-std::numeric_limits<float>::infinity());
+    extra.push_back({attn1.to_k(tokens, record), attn1.to_v(tokens, record), weight});
+  }
+  at::Tensor h = x + attn1(n1, n1, record, bias, extra);
   const at::Tensor n2 = norm2(h, record);
   h = h + (conditions.parts
                ? attn2.in_parts(n2, conditions.texts, conditions.parts->at(height, width), record)

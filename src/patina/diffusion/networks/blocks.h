@@ -12,6 +12,7 @@
 
 #include "patina/diffusion/files/config.h"
 #include "patina/diffusion/networks/part_pixels.h"
+#include "patina/diffusion/networks/reference.h"
 #include "patina/nn/attend.h"
 #include "patina/nn/layers.h"
 
@@ -23,6 +24,7 @@ struct Conditions {
   std::vector<at::Tensor> texts;                // [B,T,D] of the prompt, and of each part of the picture
   const PartLevels* parts = nullptr;            // which pixels attend to which text; null: all to the first
   const nn::SelfAttentionBias* bias = nullptr;  // null: none
+  std::span<const Reference> references;        // what the last of the batch sees beside the views
   const nn::Recorder& record;
 };
 
@@ -50,7 +52,7 @@ struct Attention {
   int64_t num_heads = 1;
 
   at::Tensor operator()(const at::Tensor& x, const at::Tensor& context, const nn::Recorder& record,
-                        const nn::LevelBias& bias = {}) const;
+                        const nn::LevelBias& bias = {}, std::span<const nn::ExtraKeys> extra = {}) const;
   /// Every pixel of x attends to the text of the part that it shows, pixels of several parts to several.
   at::Tensor in_parts(const at::Tensor& x, std::span<const at::Tensor> texts,
                       std::span<const PartPixels> parts, const nn::Recorder& record) const;

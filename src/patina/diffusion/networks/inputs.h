@@ -8,6 +8,7 @@
 #include <ATen/core/Tensor.h>
 
 #include "patina/diffusion/networks/part_pixels.h"
+#include "patina/diffusion/networks/reference.h"
 #include "patina/nn/attend.h"
 
 namespace patina::diffusion {
@@ -34,6 +35,7 @@ struct NetworkInputs {
   // part more, the first, which attends to `text`; null: all of the picture does.
   std::vector<TextConditioning> part_texts = {};
   const PartLevels* part_levels = nullptr;
+  std::vector<Reference> references = {};  // pictures that the prompts' last sees beside the views
 };
 
 }  // namespace patina::diffusion

@@ -100,7 +100,12 @@ Conditions Encoder::conditions(const NetworkInputs& inputs, const nn::Recorder& 
   const at::TensorOptions options = conv_in.weight.options();
   std::vector<at::Tensor> texts{inputs.text.tokens.to(options)};
   for (const TextConditioning& text : inputs.part_texts) texts.push_back(text.tokens.to(options));
-  return {time(inputs.timesteps, record), std::move(texts), inputs.part_levels, inputs.bias, record};
+  return {time(inputs.timesteps, record),
+          std::move(texts),
+          inputs.part_levels,
+          inputs.bias,
+          inputs.references,
+          record};
 }
 
 Encoder::Outputs Encoder::operator()(const at::Tensor& x, const Conditions& conditions) const {
