@@ -26,13 +26,13 @@ ProcessResult drafted(const fs::path& output, std::vector<std::string> more) {
   return patina(arguments);
 }
 
-// A dark blue picture with some texture.
+// A picture of blue-grey steel, about.
 fs::path blue_picture(const fs::path& folder) {
   Image picture(160, 200, 3);
   for (int y = 0; y < 200; ++y)
     for (int x = 0; x < 160; ++x) {
       const float grain = 0.06f * static_cast<float>((x * 7 + y * 13 + x * y) % 5);
-      picture.set_rgb(x, y, vec3(0.08f + grain, 0.12f + grain, 0.4f + grain));
+      picture.set_rgb(x, y, vec3(0.25f + grain, 0.3f + grain, 0.4f + grain));
     }
   write_image(folder / "blue.png", picture);
   return folder / "blue.png";
@@ -71,12 +71,12 @@ TEST(Exemplars, an_edit_comes_nearer_to_its_exemplar_in_colour) {
   const fs::path picture = blue_picture(folder.path());
   const ProcessResult without = drafted(folder.path() / "without.glb", {});
   ASSERT_EQ(without.exit_code, 0) << without.error;
-  const ProcessResult with = drafted(folder.path() / "with.glb", {"--exemplar", picture.string()});
+  const ProcessResult with = drafted(folder.path() / "with.glb", {"--exemplar", picture.string() + ":4"});
   ASSERT_EQ(with.exit_code, 0) << with.error;
   const vec3 wanted = mean_lab({read_image(picture)}, [](size_t, size_t) { return true; });
   const float far = glm::distance(mean_lab_of_edit(folder.path() / "without.patina-run"), wanted),
               near = glm::distance(mean_lab_of_edit(folder.path() / "with.patina-run"), wanted);
-  EXPECT_LT(near, 0.8f * far) << near << " against " << far;
+  EXPECT_LT(near, 0.75f * far) << near << " against " << far;
   EXPECT_TRUE(fs::exists(folder.path() / "with.patina-run" / "detail" / "exemplar_00.png"));
 }
 
