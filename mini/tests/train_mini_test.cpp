@@ -183,18 +183,26 @@ TEST(Discriminator, slope_penalty_is_the_square_of_finite_differences) {
   EXPECT_NEAR(penalty(), expected, 0.02 * expected);
 }
 
-TEST(Variogram, knows_white_noise_and_the_direction_of_stripes) {
-  at::manual_seed(3);
-  // Differences of independent values have twice their variance, at any distance and in any direction.
-  const at::Tensor noise = 0.1 * at::randn({1, 3, 136, 136});
-  const at::Tensor of_light = variogram(noise, 128).view({12, 3}).select(1, 0);
-  EXPECT_LT((of_light / (2 * 0.01 / 3) - 1).abs().max().item<float>(), 0.1f);
+/// Of light [5 differences], `distance` index of 1, 2 and 4 pixels, in the first window.
+at::Tensor variogram_of_light(const at::Tensor& pictures, int64_t window, int64_t distance) {
+  return variogram(pictures, window)[0].select(1, 0).select(1, 0).view({3, 5, 3})[distance].select(1, 0);
+}
 
-  const at::Tensor stripes = (at::arange(64) % 2).to(at::kFloat).expand({1, 3, 64, 64});
-  const at::Tensor of_stripes = variogram(stripes, 32).select(2, 0).select(2, 0).view({12, 3}).select(1, 0);
-  const at::Tensor one_apart = of_stripes.slice(0, 0, 4), two_apart = of_stripes.slice(0, 4, 8);
-  EXPECT_TRUE(one_apart.equal(at::tensor({1.0f, 0.0f, 1.0f, 1.0f}))) << one_apart;
-  EXPECT_TRUE(two_apart.equal(at::zeros({4})));
+TEST(Variogram, knows_white_noise) {
+  at::manual_seed(3);
+  const at::Tensor noise = 0.1 * at::randn({1, 3, 136, 136});
+  // Differences of independent values have twice their variance, differences of differences four times.
+  const at::Tensor expected = at::tensor({2.0f, 2.0f, 2.0f, 2.0f, 4.0f}) * 0.01 / 3;
+  for (const int64_t distance : {0, 1, 2})
+    EXPECT_LT((variogram_of_light(noise, 128, distance) / expected - 1).abs().max().item<float>(), 0.1f);
+}
+
+TEST(Variogram, knows_the_direction_of_stripes_and_a_weave) {
+  const at::Tensor columns = (at::arange(64) % 2).to(at::kFloat).expand({1, 3, 64, 64});
+  EXPECT_TRUE(variogram_of_light(columns, 32, 0).equal(at::tensor({1.0f, 0.0f, 1.0f, 1.0f, 0.0f})));
+  EXPECT_TRUE(variogram_of_light(columns, 32, 1).equal(at::zeros({5})));
+  const at::Tensor weave = columns + columns.transpose(2, 3);
+  EXPECT_TRUE(variogram_of_light(weave, 32, 0).equal(at::tensor({1.0f, 1.0f, 2.0f, 2.0f, 0.0f})));
 }
 
 TEST(Variogram, error_asks_for_the_same_grain_in_any_place) {

@@ -19,9 +19,11 @@ at::Tensor variogram(const at::Tensor& pictures, int64_t window) {
   const at::Tensor here = moved(0, 0);
   std::vector<at::Tensor> squares;
   for (int64_t distance = 1; distance <= kFarthest; distance *= 2) {
-    for (const at::Tensor& there :
-         {moved(0, distance), moved(distance, 0), moved(distance, distance), moved(distance, -distance)})
-      squares.push_back((there - here).square());
+    const at::Tensor right = moved(0, distance), down = moved(distance, 0),
+                     across = moved(distance, distance);
+    for (const at::Tensor& difference : {right - here, down - here, across - here,
+                                         moved(distance, -distance) - here, across - right - down + here})
+      squares.push_back(difference.square());
   }
   return at::avg_pool2d(at::cat(squares, 1), window, window / 2);
 }
