@@ -6,6 +6,7 @@
 #   make check-blender      the tests of the Blender extension, in Blender without a window (docs/blender.md)
 #   make blender-extension  build/blender/patina_enhance.zip, which Blender installs
 #   make sanitise     the suites that finish in minutes, under the address and undefined-behaviour sanitisers
+#   make fuzz TARGET=gltf MINUTES=5   libFuzzer on one target (docs/reliability.md lists them)
 #   make bench-noise, bench-attention, bench-inverse, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
 #   make gallery      the pictures of docs/gallery.md
 #   make train-mini   the programs that make patina-mini: make_dataset and train_mini (mini/docs/training.md)
@@ -30,7 +31,7 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: help build check check-blender blender-extension sanitise demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build check check-blender blender-extension sanitise fuzz demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -59,6 +60,16 @@ sanitise: setup
 	@cmake --preset asan-ubsan
 	@cmake --build build/asan-ubsan --parallel $(JOBS) --target $(addprefix test_,$(SANITISED))
 	@scripts/run_tests.sh build/asan-ubsan $(SANITISED)
+
+TARGET ?= gltf
+MINUTES ?= 5
+fuzz:
+	@scripts/setup.sh --fuzz
+	@cmake --preset fuzz > /dev/null
+	@cmake --build build/fuzz --parallel $(JOBS) --target fuzz_patina
+	@mkdir -p build/fuzz/corpus/$(TARGET) build/fuzz/findings
+	build/fuzz/fuzz_patina $(TARGET) build/fuzz/corpus/$(TARGET) -max_total_time=$$(($(MINUTES) * 60)) \
+	  -max_len=16384 -timeout=20 -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=build/fuzz/findings/$(TARGET)-
 
 demo: build
 	@mkdir -p $(DEMO_DIR)

@@ -4,6 +4,7 @@
 #   scripts/setup.sh            what `make build`, `make demo` and `make check` need
 #   scripts/setup.sh --ci       what .ci/run needs as well (clang-format, clang-tidy, Chromium)
 #   scripts/setup.sh --bench    the peers of the benchmarks as well (Blender)
+#   scripts/setup.sh --fuzz     what make fuzz needs as well (Clang)
 #   scripts/setup.sh --blender  what make check-blender needs as well (Blender, and a screen for its pictures)
 set -euo pipefail
 
@@ -18,6 +19,7 @@ packages=(
 )
 if [[ "${1:-}" == "--ci" ]]; then packages+=(clang-format clang-tidy chromium); fi
 if [[ "${1:-}" == "--bench" ]]; then packages+=(blender python3-numpy); fi
+if [[ "${1:-}" == "--fuzz" ]]; then packages+=(clang libclang-rt-14-dev); fi
 if [[ "${1:-}" == "--blender" ]]; then packages+=(blender python3-numpy xvfb libgl1-mesa-dri); fi
 
 missing=()

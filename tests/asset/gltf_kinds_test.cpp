@@ -238,6 +238,24 @@ TEST(ExportPlan, refuses_at_the_start_what_export_refuses_at_the_end) {
   EXPECT_EQ(refused(asset, folder.path() / "other" / "OUT.GLB"), "");
 }
 
+TEST(ExportPlan, a_glb_past_four_gibibytes_is_refused_and_a_gltf_is_not) {
+  const TemporaryFolder folder;
+  TinyGltf g = TinyGltf::quad();
+  Asset asset = read_asset(g.write_gltf(folder.path()));
+  const auto large = std::make_shared<SourceDocument>(*asset.source);
+  auto& bytes = large->buffers[0].bytes;  // a plan counts them and reads none
+  bytes = std::span(bytes.data(), size_t{5} << 30);
+  asset.source = large;
+  try {
+    plan_export(asset, folder.path() / "out.glb");
+    ADD_FAILURE() << "was planned";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kLimit);
+    EXPECT_NE(e.message().find("4 GiB; export to .gltf"), std::string::npos) << e.what();
+  }
+  EXPECT_NO_THROW(plan_export(asset, folder.path() / "other.gltf"));
+}
+
 TEST(ExportPlan, a_sidecar_never_takes_the_name_of_a_file_that_the_input_uses) {
   const TemporaryFolder folder;
   write_file(folder.path() / "out.patina.mtl", std::string_view("newmtl paint\nKd 1 0 0\n"));

@@ -45,6 +45,10 @@ TEST(JsonPatch, adds_removes_and_replaces) {
 
 // Every way of removing members of small objects, with and without an addition, must give valid JSON of the
 // right content.
+TEST(JsonPatch, a_name_that_stands_twice_is_removed_twice) {
+  EXPECT_EQ(patched_json(R"({"a":1,"b":2,"a":3})", {{"a", nullptr}}), R"({"b":2})");
+}
+
 TEST(JsonPatch, any_set_of_members_can_be_removed) {
   for (int count = 0; count <= 4; ++count)
     for (int removed = 0; removed < (1 << count); ++removed)

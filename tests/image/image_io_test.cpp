@@ -170,6 +170,16 @@ TEST(Hdr, exr_is_written_and_read_exactly) {
   expect_equal(read_hdr(folder.path() / "a.exr"), image, 0.0f);
 }
 
+TEST(Hdr, exr_holds_no_date_so_that_its_bytes_repeat) {
+  const TemporaryFolder folder;
+  write_image(folder.path() / "a.exr", Image(4, 4, 3, 0.5f));
+  const std::string bytes = read_text_file(folder.path() / "a.exr");
+  const size_t date = bytes.find("capDate");
+  if (date != std::string::npos) {
+    EXPECT_NE(bytes.find("1970:01:01 00:00:00", date), std::string::npos);
+  }
+}
+
 TEST(Hdr, real_environment_maps_have_the_stated_means) {
   struct Case {
     const char* name;

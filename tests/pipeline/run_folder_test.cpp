@@ -228,6 +228,55 @@ TEST(RunFolder, a_picture_that_was_changed_by_hand_is_copied_before_its_stage_ru
   EXPECT_EQ(read_text_file(run.file("detail/edited_01.png")), "painted again");
 }
 
+TEST(RunFolder, a_damaged_record_is_refused_with_what_to_do) {
+  const test::TemporaryFolder folder;
+  const auto refusal = [&](std::string_view text) -> std::string {
+    write_file(folder.path() / "stages.json", text);
+    try {
+      RunFolder run(folder.path());
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  for (const char* text : {"", "garbage", "{\"a\": 1}", "[1]", "[{\"name\": 3}]"}) {
+    SCOPED_TRACE(text);
+    const std::string message = refusal(text);
+    EXPECT_NE(message.find("stages.json"), std::string::npos) << message;
+    EXPECT_NE(message.find("remove it"), std::string::npos) << message;
+    EXPECT_EQ(message.find("json.exception"), std::string::npos) << message;
+  }
+}
+
+TEST(RunFolder, a_record_that_names_files_elsewhere_is_refused_and_they_stay) {
+  const test::TemporaryFolder folder;
+  const auto outside = folder.path() / "thesis.txt";
+  write_file(outside, std::string_view("years of work"));
+  for (const std::string& output : {std::string("../thesis.txt"), std::string("a/../../thesis.txt"),
+                                    outside.string(), std::string("..")}) {
+    const nlohmann::json record = {{{"name", "work"},
+                                    {"key", "k"},
+                                    {"outputs", {output}},
+                                    {"seconds", 1},
+                                    {"peak_rss_mb", 1},
+                                    {"metrics", nlohmann::json::object()},
+                                    {"warnings", nlohmann::json::array()}}};
+    write_json(folder.path() / "run" / "stages.json", record);
+    EXPECT_THROW(RunFolder(folder.path() / "run").clear(), Error) << output;
+    EXPECT_TRUE(std::filesystem::exists(outside));
+  }
+}
+
+TEST(RunFolder, a_damaged_checkpoint_is_none) {
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  for (const char* text : {"", "{}", "{}\n", "[]\n", "{\"key\": 1}\n",
+                           "{\"key\": \"key\", \"step\": \"x\", \"hash\": \"\"}\n"}) {
+    write_file(run.file(".work.checkpoint"), std::string_view(text));
+    EXPECT_FALSE(run.load_checkpoint("work", "key")) << text;
+  }
+}
+
 TEST(RunFolder, outputs_that_a_stage_no_longer_makes_are_removed) {
   const test::TemporaryFolder folder;
   RunFolder run(folder.path() / "run");

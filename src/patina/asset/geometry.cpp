@@ -28,12 +28,12 @@ double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
   return lengths > 0 ? std::acos(std::clamp(glm::dot(a, b) / lengths, -1.0, 1.0)) : 0.0;
 }
 
+}  // namespace
+
 vec3 unit_or(const glm::dvec3& v, const vec3& otherwise) {
   const double length = glm::length(v);
   return length > 0 && std::isfinite(length) ? vec3(v / length) : otherwise;
 }
-
-}  // namespace
 
 glm::dvec3 origin_for(const Extent& extent) {
   // At 64 radii a float still holds steps of 4e-6 radii, a thousandth of a pixel of a view.

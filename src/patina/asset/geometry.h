@@ -22,6 +22,9 @@ struct Geometry {
   size_t num_vertices() const { return position.size(); }
 };
 
+/// The unit vector along `v`; `otherwise` where v has no direction.
+vec3 unit_or(const glm::dvec3& v, const vec3& otherwise);
+
 /// A bounding box in double, for assets whose float positions would not tell their vertices apart.
 struct Extent {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};

@@ -155,11 +155,6 @@ dmat3 normal_matrix(const dmat3& m) {
   return cofactors * (glm::determinant(m) < 0 ? -1.0 : 1.0);
 }
 
-vec3 unit_or(const dvec3& v, const vec3& otherwise) {
-  const double length = glm::length(v);
-  return length > 0 && std::isfinite(length) ? vec3(v / length) : otherwise;
-}
-
 Primitive instance_of(const Geometry& g, const dmat4& world, const dvec3& origin, const JsonView& node) {
   Primitive out;
   const dmat3 linear(world);

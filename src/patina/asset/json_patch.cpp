@@ -131,7 +131,8 @@ class Patcher {
       if (i == children.size()) {
         if (!change.is_null()) additions.push_back(nlohmann::json(name).dump() + ": " + plain(change).dump());
       } else if (change.is_null()) {
-        removed[i] = true;
+        for (size_t k = 0; k < children.size(); ++k)  // else one that stands before it would count
+          removed[k] = removed[k] || k == i || (text_[begin] == '{' && children[k].name == name);
       } else {
         value(children[i].begin, children[i].end, change);
       }

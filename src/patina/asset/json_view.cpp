@@ -42,13 +42,14 @@ nlohmann::json parse_json(std::string_view text, const std::string& file) {
   try {
     return nlohmann::json::parse(text);
   } catch (const nlohmann::json::exception& e) {
-    // The library's message begins with its own code in brackets.
-    const std::string_view what = e.what();
-    const size_t begin = what.find("] ");
-    throw Error(ErrorCode::kFormat, file,
-                fmt::format("the JSON is malformed: {}",
-                            what.substr(begin == std::string_view::npos ? 0 : begin + 2)));
+    throw Error(ErrorCode::kFormat, file, fmt::format("the JSON is malformed: {}", json_fault(e)));
   }
+}
+
+std::string json_fault(const nlohmann::json::exception& e) {
+  const std::string what = e.what();
+  const size_t begin = what.find("] ");
+  return what.substr(begin == std::string::npos ? 0 : begin + 2);
 }
 
 std::string JsonView::kind() const {

@@ -19,6 +19,9 @@ namespace patina::asset {
 /// allocates. Throws Error{kFormat, kLimit} with `file` as context.
 nlohmann::json parse_json(std::string_view text, const std::string& file);
 
+/// What the library says is wrong, without the code in brackets that it begins with.
+std::string json_fault(const nlohmann::json::exception& e);
+
 /// A value inside a document. Views are cheap to copy; the document and the file's name must outlive them.
 class JsonView {
  public:

@@ -94,7 +94,7 @@ std::vector<vec4> vertex_colors(const std::vector<RawColor>& raw) {
 }
 
 // An index of a corner, and how many things of its kind stand above the line, from which negative ones count.
-struct Counts {
+struct ElementCounts {
   size_t positions = 0, uvs = 0, normals = 0;
 };
 
@@ -370,7 +370,7 @@ class ObjReader {
   Asset asset_;
   ObjMaterials materials_;
   const TextLine* line_ = nullptr;
-  Counts above_;
+  ElementCounts above_;
   std::vector<glm::dvec3> wide_position_;  // as the file has them, until their centre is known
   std::vector<vec3> position_, normal_;
   std::vector<vec2> uv_;

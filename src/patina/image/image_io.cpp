@@ -243,6 +243,7 @@ std::vector<uint8_t> encode_8_bit(const Image& image, const char* format, int qu
 std::vector<uint8_t> encode_exr(const Image& image) {
   OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::FLOAT);
   spec.attribute("compression", "zip");
+  spec.attribute("DateTime", "1970:01:01 00:00:00");  // else that of today, and bytes would not repeat
   return encode(image, "exr", spec, OIIO::TypeDesc::FLOAT, image.pixels.data());
 }
 

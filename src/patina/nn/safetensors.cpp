@@ -390,7 +390,9 @@ void write_safetensors(const std::filesystem::path& path, std::span<const Tensor
 void write_safetensors(const std::filesystem::path& path, std::span<const TensorPlan> tensors,
                        const std::function<void(const TensorPlan&, std::span<uint8_t>)>& fill,
                        const std::map<std::string, std::string>& metadata) {
-  const auto [header, data_bytes] = header_of(tensors, metadata);
+  const auto planned = header_of(tensors, metadata);
+  const std::string& header = planned.first;  // clang 14 captures no structured bindings
+  const uint64_t data_bytes = planned.second;
   write_file_with(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary | std::ios::trunc);
     const auto write = [&](const void* bytes, size_t size) {

@@ -14,7 +14,7 @@ namespace {
 
 const Place<InputSettings> kViewPlace{"Views", &Config::inputs, kInputs};
 const Place<RenderSettings> kRenderPlace{"Views", &Config::render, kRender};
-const Place<FitSettings> kFitPlace{"Views", &Config::fit, kFit};
+const Place<FitSettings> kFitViewsPlace{"Views", &Config::fit, kFit};
 const Place<ReportSettings> kReportPlace{"Views", &Config::report, kReport};
 
 Kind<int> num_views() {
@@ -61,7 +61,7 @@ Option max_depth() {
   };
   return joined({option(kRenderPlace, about, kind, field),
                  option(
-                     kFitPlace, about, kind, [](auto& s) -> auto& { return s.options.max_depth; }),
+                     kFitViewsPlace, about, kind, [](auto& s) -> auto& { return s.options.max_depth; }),
                  option(kReportPlace, about, kind, field)});
 }
 

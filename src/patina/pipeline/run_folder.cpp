@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "patina/asset/json_view.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/memory.h"
@@ -34,7 +35,15 @@ json to_json(const StageRecord& stage) {
           {"metrics", stage.metrics}, {"warnings", stage.warnings}};
 }
 
+// Outputs are removed when their stage runs again: a folder that came from elsewhere must not name others.
+void require_inside(const std::string& output) {
+  const fs::path path = fs::path(output).lexically_normal();
+  if (path.empty() || path.is_absolute() || *path.begin() == "..")
+    throw Error(ErrorCode::kFormat, output, "lies outside of the run folder");
+}
+
 StageRecord stage_from_json(const json& j) {
+  for (const json& output : j.at("outputs")) require_inside(output);
   return {.name = j.at("name"),
           .key = j.at("key"),
           .outputs = j.at("outputs"),
@@ -93,12 +102,19 @@ RunFolder::RunFolder(const fs::path& path) : path_(path) {
   if (failure)
     throw Error(ErrorCode::kIo, path_.string(), "the run folder cannot be made: " + failure.message());
   lock_.emplace(path_);
-  if (!fs::exists(path_ / "stages.json")) return;
+  const fs::path record = path_ / "stages.json";
+  if (!fs::exists(record)) return;
+  const auto refuse = [&](const std::string& fault) {
+    throw Error(ErrorCode::kFormat, record.string(),
+                fmt::format("is not a record of stages ({}); remove it to run all stages again", fault));
+  };
   try {
-    for (const json& stage : read_json(path_ / "stages.json")) stages_.push_back(stage_from_json(stage));
+    for (const json& stage : json::parse(read_text_file(record))) stages_.push_back(stage_from_json(stage));
   } catch (const json::exception& e) {
-    throw Error(ErrorCode::kFormat, (path_ / "stages.json").string(),
-                fmt::format("is not a record of stages ({}); remove it to run all stages again", e.what()));
+    refuse(asset::json_fault(e));
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kFormat) throw;
+    refuse(e.what());
   }
 }
 
@@ -254,13 +270,17 @@ std::optional<RunFolder::SavedCheckpoint> RunFolder::load_checkpoint(std::string
   if (!fs::exists(path)) return std::nullopt;
   const std::vector<uint8_t> file = read_file(path, ~uint64_t{0});
   const auto line_end = std::find(file.begin(), file.end(), '\n');
-  const json header = json::parse(file.begin(), line_end, nullptr, false);
-  if (line_end == file.end() || !header.is_object() || header.value("key", "") != key) return std::nullopt;
-  SavedCheckpoint saved{.step = header.value("step", 0), .bytes = {line_end + 1, file.end()}};
-  if (header.value("hash", "") != hash_bytes(saved.bytes)) return std::nullopt;
-  earlier_seconds_ = header.value("seconds", 0.0);
-  earlier_peak_mb_ = header.value("peak_rss_mb", 0.0);
-  return saved;
+  if (line_end == file.end()) return std::nullopt;
+  try {
+    const json header = json::parse(file.begin(), line_end);
+    SavedCheckpoint saved{.step = header.at("step"), .bytes = {line_end + 1, file.end()}};
+    if (header.at("key") != key || header.at("hash") != hash_bytes(saved.bytes)) return std::nullopt;
+    earlier_seconds_ = header.at("seconds");
+    earlier_peak_mb_ = header.at("peak_rss_mb");
+    return saved;
+  } catch (const json::exception&) {
+    return std::nullopt;  // damaged: the stage starts anew
+  }
 }
 
 }  // namespace patina::pipeline
