@@ -127,6 +127,45 @@ TEST(Masks, outside_of_a_mask_views_and_textures_keep_their_bytes) {
             image_of(before, before.materials[2].base_color).pixels);
 }
 
+// `asset` enhanced on one half of its enamel.
+ProcessResult half_enhanced(const fs::path& asset, const char* prompt, const fs::path& mask,
+                            const fs::path& output) {
+  std::vector<std::string> arguments{"enhance", asset.string(), "-p", prompt, "-o", output.string()};
+  for (const char* word : {"--views", "4", "--resolution", "64", "--samples", "1", "-s", "3",
+                           "--fit-iterations", "4", "--turntable", "0", "--material", "enamel", "--mask"})
+    arguments.emplace_back(word);
+  arguments.push_back(mask.string());
+  return patina(arguments);
+}
+
+TEST(Masks, a_second_layer_of_age_leaves_the_first_where_its_mask_is_black) {
+  const TemporaryFolder folder;
+  Image left = constant_grey(32, 32, 0.0f);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 16; ++x) *left.at(x, y) = 1.0f;
+  Image right = left;
+  for (float& value : right.pixels) value = 1.0f - value;
+  write_image(folder.path() / "left.png", left);
+  write_image(folder.path() / "right.png", right);
+  const fs::path first = folder.path() / "rusty.glb", second = folder.path() / "mossy.glb";
+  ProcessResult result = half_enhanced(small_kettle(), "rust", folder.path() / "left.png", first);
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+  result = half_enhanced(first, "moss", folder.path() / "right.png", second);
+  ASSERT_EQ(result.exit_code, 0) << result.error;
+
+  const asset::Asset clean = asset::read_asset(small_kettle()), rusty = asset::read_asset(first),
+                     mossy = asset::read_asset(second);
+  const auto base_color = [](const asset::Asset& asset) -> const Image& {
+    return image_of(asset, asset.materials[0].base_color);
+  };
+  const int half = base_color(clean).width / 2;
+  const auto on_left = [&](int x, int) { return x < half; };
+  const auto on_right = [&](int x, int) { return x >= half; };
+  EXPECT_GT(share_changed(base_color(clean), base_color(rusty), on_left), 0.3);
+  EXPECT_EQ(share_changed(base_color(rusty), base_color(mossy), on_left), 0.0);
+  EXPECT_GT(share_changed(base_color(rusty), base_color(mossy), on_right), 0.3);
+}
+
 struct Refusal {
   std::vector<std::string> options;
   int exit_code;
