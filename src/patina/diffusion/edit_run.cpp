@@ -114,6 +114,7 @@ at::Tensor tile(const std::vector<at::Tensor>& views, int64_t grid) {
 /// The whole grid's condition image through a ControlNet's embedding.
 at::Tensor grid_hint(const Held<ControlNet>& network, const std::vector<Image>& views, int64_t grid) {
   std::vector<at::Tensor> tensors;
+  tensors.reserve(views.size());
   for (const Image& view : views) tensors.push_back(tensor_from_image(view));
   return network.use()->hint(tile(tensors, grid));
 }
@@ -142,13 +143,19 @@ TextConditioning encode_texts(const Model::State& networks, const std::string& p
   return join_encoders(texts);
 }
 
+/// Means over the pixels of each of the grid's latent pixels, [C,H,W].
+at::Tensor latent_means(const std::vector<Image>& views, const GridSizes& sizes) {
+  std::vector<at::Tensor> means;
+  means.reserve(views.size());
+  for (const Image& view : views)
+    means.push_back(
+        at::adaptive_avg_pool2d(tensor_from_image(view), {sizes.latent_height, sizes.latent_width}));
+  return tile(means, sizes.grid).squeeze(0);
+}
+
 /// The parts' shares [parts + 1,H,W] of the grid's latent pixels, before them what is left for the prompt.
 at::Tensor latent_shares(const std::vector<Image>& part_views, const GridSizes& sizes) {
-  std::vector<at::Tensor> tensors;
-  for (const Image& view : part_views)
-    tensors.push_back(
-        at::adaptive_avg_pool2d(tensor_from_image(view), {sizes.latent_height, sizes.latent_width}));
-  const at::Tensor parts = tile(tensors, sizes.grid).squeeze(0);
+  const at::Tensor parts = latent_means(part_views, sizes);
   return at::cat({at::clamp_min(1 - parts.sum(0, /*keepdim=*/true), 0), parts});
 }
 
@@ -158,21 +165,17 @@ std::vector<DenoiserReference> references_of(const Model::State& networks, const
                                              const Progress& progress) {
   std::vector<DenoiserReference> references;
   for (const EditInputs::Exemplar& exemplar : inputs.exemplars) {
-    std::vector<at::Tensor> weights;
-    for (const Image& view : exemplar.view_weights)
-      weights.push_back(
-          at::adaptive_avg_pool2d(tensor_from_image(view), {sizes.latent_height, sizes.latent_width}));
     // An exemplar is as large as one view and shall count like all of them.
     const auto as_views = static_cast<double>(sizes.grid * sizes.grid);
     std::vector<float> x0 = start_latents(*networks.vae.use(), {exemplar.picture}, 1, progress);
     std::vector<float> noise =
         scheduler_noise(options.seed, -1 - static_cast<int>(references.size()), x0.size());
-    references.push_back(
-        {std::move(x0),
-         std::move(noise),
-         {1, networks.vae.config().latent_channels, sizes.latent_height, sizes.latent_width},
-         encode_texts(networks, options.prompt, {1, {}}, options.clip_skip),
-         ReferenceWeights(as_views * tile(weights, sizes.grid)[0][0], networks.unet.config().levels.size())});
+    references.push_back({std::move(x0),
+                          std::move(noise),
+                          {1, networks.vae.config().latent_channels, sizes.latent_height, sizes.latent_width},
+                          encode_texts(networks, options.prompt, {1, {}}, options.clip_skip),
+                          ReferenceWeights(as_views * latent_means(exemplar.view_weights, sizes)[0],
+                                           networks.unet.config().levels.size())});
   }
   return references;
 }
