@@ -108,7 +108,7 @@ nlohmann::json parts_as_json(const PartPrompts& parts, const Workbench& bench) {
   for (size_t part = 0; part < parts.prompts.size(); ++part) {
     nlohmann::json names = nlohmann::json::array();
     for (size_t m = 0; m < parts.part_of.size(); ++m)
-      if (parts.part_of[m] == static_cast<int>(part)) names.push_back(bench.maps[m].name);
+      if (parts.part_of[m] == static_cast<int>(part)) names.push_back(printable(bench.maps[m].name));
     const auto& [prompt, negative_prompt] = parts.prompts[part];
     const Color& color = color_of(part);
     list.push_back(

@@ -191,7 +191,7 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
     for (size_t i = 0; i < prepared.inputs.exemplars.size(); ++i) {
       result.outputs.push_back(numbered("detail/exemplar", i, ".png"));
       write_image(run.file(result.outputs.back()), prepared.inputs.exemplars[i].picture);
-      shown.push_back({{"file", result.outputs.back()}, {"caption", settings.exemplars[i]}});
+      shown.push_back({{"file", result.outputs.back()}, {"caption", printable(settings.exemplars[i])}});
     }
     const diffusion::Guidance guidance = diffusion::guidance_of(model, options);
     const size_t latent_pixels = prepared.inputs.noise.size() / static_cast<size_t>(model.latent_channels());
