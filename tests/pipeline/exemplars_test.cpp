@@ -9,7 +9,6 @@
 #include "patina/image/image_io.h"
 #include "patina/image/lab.h"
 #include "process.h"
-#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::test {
@@ -17,13 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-ProcessResult drafted(const fs::path& output, std::vector<std::string> more) {
-  std::vector<std::string> arguments{"enhance", small_kettle().string(), "-p", "a rusty old kettle"};
-  for (const char* word : {"--preset", "draft", "--resolution", "128", "--samples", "4", "-s", "6", "-o"})
-    arguments.emplace_back(word);
-  arguments.push_back(output.string());
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return patina(arguments);
+ProcessResult drafted(const fs::path& output, const std::vector<std::string>& more) {
+  std::vector<std::string> options{"--preset", "draft", "--resolution", "128", "--samples", "4", "-s", "6"};
+  options.insert(options.end(), more.begin(), more.end());
+  return enhance_small_kettle(output, options);
 }
 
 // A picture of blue-grey steel, about.
@@ -85,26 +81,13 @@ TEST(Exemplars, what_cannot_be_one_is_refused_before_rendering) {
   const auto file = [&](const char* name) { return (folder.path() / name).string(); };
   const std::string blue = blue_picture(folder.path()).string();
   write_file(file("text.png"), std::string_view("no picture"));
-  struct Refusal {
-    std::string exemplar;
-    int exit_code;
-    std::vector<std::string> says;
-  };
-  const std::vector<Refusal> refusals{
-      {file("missing.png"), 1, {"missing.png"}},
-      {file("text.png"), 1, {"text.png"}},
-      {blue + ":0", 2, {"exemplar", "above 0"}},
-      {blue + ":1000", 2, {"exemplar", "up to 100"}},
-      {"glass=" + blue, 2, {"'glass'", "'enamel'", "'steel'", "'wood'"}},
-  };
-  for (const Refusal& refusal : refusals) {
-    SCOPED_TRACE(refusal.exemplar);
-    const ProcessResult result = drafted(folder.path() / "out.glb", {"--exemplar", refusal.exemplar});
-    EXPECT_EQ(result.exit_code, refusal.exit_code) << result.error;
-    for (const std::string& text : refusal.says)
-      EXPECT_NE(result.error.find(text), std::string::npos) << text << " in " << result.error;
-    EXPECT_FALSE(fs::exists(folder.path() / "out.patina-run" / "views"));
-  }
+  expect_refused_before_rendering({
+      {{"--exemplar", file("missing.png")}, 1, {"missing.png"}},
+      {{"--exemplar", file("text.png")}, 1, {"text.png"}},
+      {{"--exemplar", blue + ":0"}, 2, {"exemplar", "above 0"}},
+      {{"--exemplar", blue + ":1000"}, 2, {"exemplar", "up to 100"}},
+      {{"--exemplar", "glass=" + blue}, 2, {"'glass'", "'enamel'", "'steel'", "'wood'"}},
+  });
 }
 
 }  // namespace

@@ -166,12 +166,6 @@ TEST(Masks, a_second_layer_of_age_leaves_the_first_where_its_mask_is_black) {
   EXPECT_GT(share_changed(base_color(rusty), base_color(mossy), on_right), 0.3);
 }
 
-struct Refusal {
-  std::vector<std::string> options;
-  int exit_code;
-  std::vector<std::string> says;
-};
-
 TEST(Masks, what_is_no_mask_is_refused_before_rendering) {
   const TemporaryFolder folder;
   const auto file = [&](const char* name) { return (folder.path() / name).string(); };
@@ -201,17 +195,7 @@ TEST(Masks, what_is_no_mask_is_refused_before_rendering) {
       {{"--where", "corners"}, 2, {"edges", "crevices", "drips", "'corners'"}},
       {{"--where", "edges:1.5"}, 2, {"up to 1"}},
   };
-  for (const Refusal& refusal : refusals) {
-    SCOPED_TRACE(refusal.options.back());
-    const fs::path output = folder.path() / "out.glb";
-    std::vector<std::string> arguments = command(output, refusal.options);
-    arguments.erase(arguments.begin());  // the program
-    const ProcessResult result = patina(arguments);
-    EXPECT_EQ(result.exit_code, refusal.exit_code) << result.error;
-    for (const std::string& text : refusal.says)
-      EXPECT_NE(result.error.find(text), std::string::npos) << text << " in " << result.error;
-    EXPECT_FALSE(fs::exists(folder.path() / "out.patina-run" / "views"));
-  }
+  expect_refused_before_rendering(refusals);
 }
 
 }  // namespace

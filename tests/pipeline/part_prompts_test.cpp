@@ -15,17 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Four small views and few steps of the bundled model.
-ProcessResult enhanced(const fs::path& output, std::vector<std::string> more) {
-  std::vector<std::string> arguments{"enhance", small_kettle().string(), "-p", "a clean new kettle"};
-  for (const char* word : {"--views", "4", "--resolution", "128", "--samples", "4", "-s", "6",
-                           "--fit-iterations", "2", "--turntable", "0", "-o"})
-    arguments.emplace_back(word);
-  arguments.push_back(output.string());
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return patina(arguments);
-}
-
 // Mean of green less red over the pixels of `color` in the pictures of the parts, all views.
 double greenness(const fs::path& run, const vec3& color) {
   double sum = 0, count = 0;
@@ -48,37 +37,26 @@ double greenness(const fs::path& run, const vec3& color) {
 TEST(PartPrompts, each_material_follows_its_own_words) {
   const TemporaryFolder folder;
   const fs::path output = folder.path() / "out.glb", run = folder.path() / "out.patina-run";
-  const ProcessResult result =
-      enhanced(output, {"--preset", "draft", "--prompt-for", "enamel=green moss", "wood=rust",
-                        "--negative-prompt-for", "steel=rust", "--guidance-scale", "3"});
+  const ProcessResult result = enhance_small_kettle(
+      output, {"-p", "a clean new kettle", "--resolution", "128", "--samples", "4", "-s", "6", "--preset",
+               "draft", "--prompt-for", "enamel=green moss", "wood=rust", "--negative-prompt-for",
+               "steel=rust", "--guidance-scale", "3"});
   ASSERT_EQ(result.exit_code, 0) << result.error;
   const vec3 first = vec3(230, 159, 0) / 255.0f, third = vec3(0, 158, 115) / 255.0f;
   EXPECT_GT(greenness(run, first), greenness(run, third) + 0.1);
 }
 
 TEST(PartPrompts, wrong_ones_are_refused_before_rendering) {
-  struct Refusal {
-    std::vector<std::string> options, says;
-  };
-  const std::vector<Refusal> refusals{
-      {{"--prompt-for", "moss"}, {"prompt-for", "MATERIAL=TEXT", "'moss'"}},
-      {{"--prompt-for", "glass=moss"}, {"prompt-for", "'glass'", "'enamel'", "'steel'", "'wood'"}},
-      {{"--prompt-for", "enamel=moss", "enamel=rust"}, {"prompt-for", "'enamel'", "twice"}},
-      {{"--prompt-for", "steel=moss", "--protect", "steel"}, {"'steel'", "may change"}},
-      {{"--negative-prompt-for", "glass=moss"}, {"negative-prompt-for", "'glass'"}},
-      {{"--strength-for", "enamel"}, {"strength-for", "MATERIAL=S"}},
-      {{"--strength-for", "enamel=2"}, {"strength-for", "from 0 to 1", "'enamel=2'"}},
-      {{"--strength-for", "glass=0.5"}, {"strength-for", "'glass'"}},
-  };
-  for (const Refusal& refusal : refusals) {
-    SCOPED_TRACE(refusal.options.back());
-    const TemporaryFolder folder;
-    const ProcessResult result = enhanced(folder.path() / "out.glb", refusal.options);
-    EXPECT_EQ(result.exit_code, 2) << result.error;
-    for (const std::string& text : refusal.says)
-      EXPECT_NE(result.error.find(text), std::string::npos) << text << " in " << result.error;
-    EXPECT_FALSE(fs::exists(folder.path() / "out.patina-run" / "views"));
-  }
+  expect_refused_before_rendering({
+      {{"--prompt-for", "moss"}, 2, {"prompt-for", "MATERIAL=TEXT", "'moss'"}},
+      {{"--prompt-for", "glass=moss"}, 2, {"prompt-for", "'glass'", "'enamel'", "'steel'", "'wood'"}},
+      {{"--prompt-for", "enamel=moss", "enamel=rust"}, 2, {"prompt-for", "'enamel'", "twice"}},
+      {{"--prompt-for", "steel=moss", "--protect", "steel"}, 2, {"'steel'", "may change"}},
+      {{"--negative-prompt-for", "glass=moss"}, 2, {"negative-prompt-for", "'glass'"}},
+      {{"--strength-for", "enamel"}, 2, {"strength-for", "MATERIAL=S"}},
+      {{"--strength-for", "enamel=2"}, 2, {"strength-for", "from 0 to 1", "'enamel=2'"}},
+      {{"--strength-for", "glass=0.5"}, 2, {"strength-for", "'glass'"}},
+  });
 }
 
 TEST(PartPrompts, info_writes_a_file_to_fill_in_that_patina_reads) {

@@ -6,7 +6,6 @@
 #include "in_process.h"
 #include "patina/base/files.h"
 #include "process.h"
-#include "small_kettle.h"
 #include "support.h"
 
 namespace patina::test {
@@ -14,14 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-ProcessResult enhanced(const fs::path& output, std::vector<std::string> more) {
-  std::vector<std::string> arguments{"enhance", small_kettle().string(), "-p", "a rusty old kettle"};
-  for (const char* word : {"--views", "4", "--resolution", "64", "--samples", "1", "-s", "2",
-                           "--fit-iterations", "1", "--turntable", "0", "-o"})
-    arguments.emplace_back(word);
-  arguments.push_back(output.string());
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return patina(arguments);
+ProcessResult enhanced(const fs::path& output, const std::vector<std::string>& more) {
+  std::vector<std::string> options{"--resolution", "64", "--samples",        "1",
+                                   "-s",           "2",  "--fit-iterations", "1"};
+  options.insert(options.end(), more.begin(), more.end());
+  return enhance_small_kettle(output, options);
 }
 
 TEST(Variants, seeds_share_their_renders_and_the_chosen_edit_is_not_made_again) {

@@ -43,12 +43,13 @@ struct Denoiser {
   TextConditioning text;  // of two prompts, the negative one first; of one without guidance
   float guidance_scale = 1;
   bool one_batch = true;  // both prompts of guidance in one evaluation; else in turn, the negative one first
-  const nn::SelfAttentionBias* bias = nullptr;    // null: none
-  bool bias_controls = false;                     // whether it acts on the ControlNets too
-  nn::Recorder record = {};                       // listens to the U-Net
-  std::vector<TextConditioning> part_texts = {};  // likewise, of the parts that have words of their own
+  const nn::SelfAttentionBias* bias = nullptr;  // null: none
+  bool bias_controls = false;                   // whether it acts on the ControlNets too
+  nn::Recorder record = {};                     // listens to the U-Net
+  std::vector<TextConditioning> part_texts =
+      {};  // of the parts that have words of their own; prompts as in `text`
   std::optional<PartLevels> part_levels = std::nullopt;  // where these act; nullopt: there are none
-  std::vector<DenoiserReference> references = {};
+  std::vector<DenoiserReference> references = {};        // pictures that the edit shall be like
 
   /// latents [1,C,H,W] f32, scaled as the scheduler asks; `noised`: those of the references, likewise.
   Guided operator()(const at::Tensor& latents, double timestep,

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
-#include "patina/base/files.h"
 #include "patina/base/text.h"
 #include "patina/image/image_io.h"
 #include "patina/report/scale.h"
@@ -52,7 +51,6 @@ void take_file(const std::string& text, Exemplar& exemplar) {
     if (weight) exemplar.weight = *weight, file = text.substr(0, colon);
   }
   exemplar.picture = picture_of(file);
-  exemplar.hash = hash_file(file);
 }
 
 // The largest part in the middle with the proportions of width × height, at that size.
@@ -76,8 +74,10 @@ std::vector<Exemplar> read_exemplars(const Workbench& bench, const Strength& str
   for (const std::string& text : settings.exemplars) {
     Exemplar exemplar;
     exemplar.materials = strength.enhanced;
+    std::error_code ignored;
     const bool names_material = text.find('=') != std::string::npos &&
-                                !fs::exists(text.substr(0, text.rfind(':'))) && !fs::exists(text);
+                                !fs::exists(text.substr(0, text.rfind(':')), ignored) &&
+                                !fs::exists(text, ignored);
     if (names_material) {
       ForMaterial part = for_material(bench.asset, strength.enhanced, text, "exemplar",
                                       "FILE or MATERIAL=FILE, with :WEIGHT behind it or without");

@@ -9,7 +9,6 @@
 namespace patina::pipeline {
 
 struct Exemplar {
-  std::string hash;             // of its bytes
   Image picture;                // [H,W,3] sRGB, as the file has it
   float weight = 1;             // how much the views look at it; 1: as at all views together
   std::vector<bool> materials;  // that look at it

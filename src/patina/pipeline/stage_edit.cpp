@@ -24,10 +24,11 @@ using nlohmann::json;
 namespace {
 
 std::string edit_key(const Workbench& bench, const Strength& strength, const RenderedViews& views,
-                     const EditSettings& settings, const ResolvedModel& model) {
+                     const EditSettings& settings, std::span<const Exemplar> exemplars,
+                     const ResolvedModel& model) {
   StageKey key(bench, settings);
   key.add(views.tile).add(views.normal).add_strength(strength).add(model.hash());
-  for (const Exemplar& exemplar : read_exemplars(bench, strength, settings)) key.add(exemplar.hash);
+  for (const Exemplar& exemplar : exemplars) key.add(exemplar.picture);
   return key.hash();
 }
 
@@ -135,8 +136,7 @@ PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, cons
                      .noise = std::move(noise),
                      .bias_levels = {},
                      .strength_views = strength.views,
-                     .part_views = part_views(parts, views.set),
-                     .exemplars = exemplar_inputs(read_exemplars(bench, strength, settings), views.set)};
+                     .part_views = part_views(parts, views.set)};
   if (settings.options.bias_weight != 0) {
     start = Clock::now();
     prepared.inputs.bias_levels = correspond::bias_levels(*bench.scene, bench.cameras, progress, scale);
@@ -148,7 +148,8 @@ PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, cons
 std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
                               const EditSettings& settings, ResolvedModel& resolved, RunFolder& run,
                               const RunProgress& progress) {
-  const std::string key = edit_key(bench, strength, views, settings, resolved);
+  const std::vector<Exemplar> exemplars = read_exemplars(bench, strength, settings);
+  const std::string key = edit_key(bench, strength, views, settings, exemplars, resolved);
   adopt_variant(run, settings.options.seed, key);
   run.run_stage("detail", key, progress, [&] {
     const auto start = Clock::now();
@@ -156,7 +157,8 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
     const bool loads = !resolved.is_loaded();  // else its weights are among the bytes before
     const diffusion::Model& model = resolved.loaded();
     const double load_seconds = seconds_since(start);
-    const PreparedEdit prepared = prepare_edit(bench, strength, views, settings, model, progress);
+    PreparedEdit prepared = prepare_edit(bench, strength, views, settings, model, progress);
+    prepared.inputs.exemplars = exemplar_inputs(exemplars, views.set);
 
     const diffusion::EditOptions& options = prepared.options;
     const diffusion::EditMemory memory = diffusion::predict_memory(

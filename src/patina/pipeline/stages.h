@@ -45,8 +45,9 @@ Strength mask_stage(const Workbench& bench, const MaskSettings& settings, RunFol
 RenderedViews render_stage(const Workbench& bench, const RenderSettings& settings, RunFolder& run,
                            const RunProgress& progress);
 
-/// What the diffusion model is given beside the options: control images, noise and correspondences. Throws
-/// Error{kUsage} if the views do not fit the model.
+/// What the diffusion model is given beside the options: control images, noise, correspondences and the words
+/// of single materials; exemplars come on top (exemplars.h). Throws Error{kUsage} if the views do not fit the
+/// model.
 struct PreparedEdit {
   diffusion::EditInputs inputs;
   diffusion::EditOptions options;  // the settings' own, and the words of single materials
@@ -58,7 +59,8 @@ PreparedEdit prepare_edit(const Workbench& bench, const Strength& strength, cons
                           const RunProgress& progress);
 
 /// Lets the diffusion model edit the views → detail/edited_NN.png; with masks also their strengths there,
-/// detail/strength_NN.png. Loads the model where it is needed.
+/// detail/strength_NN.png, with words for single materials detail/parts_NN.png, with exemplars
+/// detail/exemplar_NN.png. Loads the model where it is needed.
 std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, const RenderedViews& views,
                               const EditSettings& settings, ResolvedModel& model, RunFolder& run,
                               const RunProgress& progress);
