@@ -7,6 +7,8 @@
 #   make blender-extension  build/blender/patina_enhance.zip, which Blender installs
 #   make sanitise     the suites that finish in minutes, under the address and undefined-behaviour sanitisers
 #   make fuzz TARGET=gltf MINUTES=5   libFuzzer on one target (docs/reliability.md lists them)
+#   make kill-campaign KILLS=200      kills small runs at random moments and compares what they leave
+#   make fault-campaign   fails every call of a small run that writes a file, one after the other
 #   make bench-noise, bench-attention, bench-inverse, bench-unet   measure, print tables, write build/bench/*.json (docs/performance.md)
 #   make gallery      the pictures of docs/gallery.md
 #   make train-mini   the programs that make patina-mini: make_dataset and train_mini (mini/docs/training.md)
@@ -31,7 +33,7 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: help build check check-blender blender-extension sanitise fuzz demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build check check-blender blender-extension sanitise fuzz kill-campaign fault-campaign demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -70,6 +72,15 @@ fuzz:
 	@mkdir -p build/fuzz/corpus/$(TARGET) build/fuzz/findings
 	build/fuzz/fuzz_patina $(TARGET) build/fuzz/corpus/$(TARGET) -max_total_time=$$(($(MINUTES) * 60)) \
 	  -max_len=16384 -timeout=20 -rss_limit_mb=4096 -print_final_stats=1 -artifact_prefix=build/fuzz/findings/$(TARGET)-
+
+KILLS ?= 200
+kill-campaign: build
+	@scripts/kill_campaign.sh build/release/patina $(KILLS)
+
+fault-campaign: setup
+	@cmake --preset release -DPATINA_BUILD_TESTS=ON
+	@cmake --build build/release --parallel $(JOBS) --target test_faults
+	PATINA_FAULTS=all OMP_WAIT_POLICY=passive build/release/test_faults
 
 demo: build
 	@mkdir -p $(DEMO_DIR)

@@ -1,11 +1,15 @@
 // patina models, patina model check: what lies in the folders of models, and whether a file is what it should
 // be.
+#include <utility>
+
 #include <fmt/format.h>
 
+#include "bundled_model.h"
 #include "commands.h"
 #include "patina/base/error.h"
 #include "patina/diffusion/check_model.h"
 #include "patina/diffusion/list_models.h"
+#include "patina/pipeline/known_words.h"
 
 namespace patina::app {
 namespace {
@@ -43,6 +47,21 @@ void print_models(const std::vector<std::filesystem::path>& folders) {
   for (const std::string& part : missing) fmt::print("  {}\n", part);
 }
 
+void print_bundled_model() {
+  const std::filesystem::path model = bundled_model();
+  if (model.empty())
+    throw Error(ErrorCode::kNotFound, "patina-mini",
+                "does not lie beside the program; name folders of models: `patina models DIR`");
+  print_models({model});
+  fmt::print("\nIt knows these words:\n");
+  std::string line = " ";
+  for (const std::string& word : pipeline::known_words(model)) {
+    if (line.size() + 1 + word.size() > 78) fmt::print("{}\n", std::exchange(line, " "));
+    line += " " + word;
+  }
+  fmt::print("{}\n", line);
+}
+
 }  // namespace
 
 void add_models(CLI::App& program) {
@@ -51,11 +70,17 @@ void add_models(CLI::App& program) {
       "List the models in folders: what each file is, its family, precision, size and what it needs.");
   auto folders = std::make_shared<std::vector<std::string>>();
   models
-      ->add_option("DIR,--model-dir", *folders,
-                   "Folders of models: those of ComfyUI or AUTOMATIC1111, or any other.")
-      ->required()
+      ->add_option(
+          "DIR,--model-dir", *folders,
+          "Folders of models: those of ComfyUI or AUTOMATIC1111, or any other. Without one: the model "
+          "that comes with patina, and the words that it knows.")
       ->type_name("");
-  models->callback([=] { print_models({folders->begin(), folders->end()}); });
+  models->callback([=] {
+    if (folders->empty())
+      print_bundled_model();
+    else
+      print_models({folders->begin(), folders->end()});
+  });
 
   CLI::App* model = program.add_subcommand("model", "Look at one model.");
   model->require_subcommand(1);

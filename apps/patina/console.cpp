@@ -1,5 +1,6 @@
 #include "console.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -7,10 +8,12 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "patina/base/mapped_files.h"
 #include "peak_memory.h"
 
 namespace patina::app {
@@ -25,10 +28,32 @@ constexpr double kLogSeconds = 15.0;    // a line in a log
 constexpr double kQuietSeconds = 1.0;   // jobs shorter than this draw nothing
 constexpr int kBarWidth = 24;
 
-std::atomic<int> g_stop_requests{0};  // signal handlers can reach nothing but a global
+// Signal handlers can reach nothing but globals, and call little but write().
+std::atomic<int> g_stop_requests{0};
+std::atomic<bool> g_says_that_it_stops{false};
+
+void write_in_handler(const char* text) {
+  if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;  // nobody is left to tell
+}
 
 extern "C" void on_stop_signal(int signal) {
   if (g_stop_requests.fetch_add(1) > 0) std::_Exit(128 + signal);
+  if (g_says_that_it_stops) write_in_handler("\nstopping after this step; once more ends at once\n");
+}
+
+// Reading a mapped file that has become shorter, or whose disk fails, ends in this signal.
+extern "C" void on_bus_error(int, siginfo_t* info, void*) {
+  const char* file = mapped_file_at(info->si_addr);
+  write_in_handler("patina: ");
+  write_in_handler(file ? file : "a file");
+  write_in_handler(": became shorter, or could not be read, while it was in use\n");
+  std::_Exit(1);
+}
+
+// Of the terminal on standard error; 0 where it does not tell.
+size_t terminal_columns() {
+  winsize size{};
+  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
 }
 
 // Failures are ignored: a full disk or a closed terminal must not end a run of hours.
@@ -77,9 +102,23 @@ const char* name_of(ErrorCode code) {
   return "";
 }
 
-void install_stop_handler() {
+void install_signal_handlers() {
   std::signal(SIGINT, on_stop_signal);
   std::signal(SIGTERM, on_stop_signal);
+  struct sigaction bus {};
+  bus.sa_sigaction = on_bus_error;
+  bus.sa_flags = SA_SIGINFO;
+  ::sigaction(SIGBUS, &bus, nullptr);
+}
+
+std::string progress_line(const std::string& task, double share, const std::string& text, size_t columns) {
+  const std::string numbers = fmt::format("{:3.0f} %  {}", 100 * share, text);
+  // A line that wraps would not be overwritten by the next one.
+  if (columns > 0 && std::max<size_t>(task.size(), 14) + kBarWidth + numbers.size() + 2 >= columns)
+    return (task + numbers).substr(0, columns - 1);
+  std::string bar;
+  for (int i = 0; i < kBarWidth; ++i) bar += i < std::lround(share * kBarWidth) ? "━" : "─";
+  return fmt::format("{:<14} {} {}", task, bar, numbers);
 }
 
 std::string format_duration(double seconds) {
@@ -92,9 +131,12 @@ std::string format_duration(double seconds) {
 Console::Console(Style style)
     : json_(style == Style::kJson || style == Style::kQuietJson),
       quiet_(style == Style::kQuiet || style == Style::kQuietJson),
-      is_terminal_(!json_ && ::isatty(STDERR_FILENO) != 0) {}
+      is_terminal_(!json_ && ::isatty(STDERR_FILENO) != 0) {
+  g_says_that_it_stops = !json_ && !quiet_;
+}
 
 Console::~Console() {
+  g_says_that_it_stops = false;
   finish();
 }
 
@@ -187,10 +229,7 @@ void Console::draw(double done, double total) {
                            : left >= 0 ? format_duration(left) + " left"
                                        : "";
   if (is_terminal_) {
-    const int filled = static_cast<int>(std::lround(share * kBarWidth));
-    std::string bar;
-    for (int i = 0; i < kBarWidth; ++i) bar += i < filled ? "━" : "─";
-    write_error_stream(fmt::format("\r\x1b[K{:<14} {} {:3.0f} %  {}", task_, bar, 100 * share, text));
+    write_error_stream("\r\x1b[K" + progress_line(task_, share, text, terminal_columns()));
     bar_drawn_ = true;
   } else {
     write_error_stream(fmt::format("{:<14} {:3.0f} %  {}\n", task_, 100 * share, text));

@@ -62,8 +62,13 @@ void write_event(const nlohmann::json& event);
 const char* name_of(ErrorCode code);
 
 /// Installs a handler for Ctrl-C and termination: the first asks the running stage to stop and keep what it
-/// has, the second ends at once.
-void install_stop_handler();
+/// has and says that it was heard, the second ends at once. And one for SIGBUS, which names the mapped file
+/// that became shorter.
+void install_signal_handlers();
+
+/// One line of a terminal `columns` wide (0: not known): task, bar, share in [0,1], text. Without the bar,
+/// and cut, where it would wrap.
+std::string progress_line(const std::string& task, double share, const std::string& text, size_t columns);
 
 /// "1 h 02 min", "3 min 20 s", "12 s".
 std::string format_duration(double seconds);

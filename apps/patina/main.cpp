@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   const std::string_view command = argc > 1 ? argv[1] : "";
   if (command == "enhance" || command == "detail" || command == "ablate" || command == "show-attention")
     patina::app::sleep_between_parallel_regions(argv);
-  patina::app::install_stop_handler();
+  patina::app::install_signal_handlers();
+  patina::app::say_why_when_terminated();
   return patina::app::run_program(argc, argv);
 }

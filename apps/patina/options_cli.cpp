@@ -159,7 +159,7 @@ int parse_count(const std::string& setting, const std::string& text) {
 }
 
 void require_prompt(const pipeline::Config& config) {
-  if (config.edit.options.prompt.empty())
+  if (config.edit.options.prompt.find_first_not_of(" \t\r\n") == std::string::npos)
     throw Error(ErrorCode::kUsage, "prompt",
                 "say what the asset should look like, e.g. --prompt \"a rusty old kettle\"");
 }

@@ -1,9 +1,13 @@
 #include "program.h"
 
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
 #include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -41,6 +45,26 @@ bool asks_for_events(int argc, char** argv) {
   return false;
 }
 
+std::string refused_by_system(const std::system_error& e) {
+  return fmt::format("the system refuses a thread or a lock ({}); is a limit reached (ulimit -u, -v)? {}",
+                     e.code().message(), "Fewer threads need less (--threads 1)");
+}
+
+// Thread pools of other libraries start threads where no exception can be caught.
+[[noreturn]] void end_with_reason() {
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+    fail(1, "fault", "", "ended without a reason", false);
+  } catch (const std::system_error& e) {
+    fail(1, "device", "", refused_by_system(e), false);
+  } catch (const std::exception& e) {
+    fail(1, "fault", "", printable(e.what(), 2000), false);
+  } catch (...) {
+    fail(1, "fault", "", "an exception of no known type", false);
+  }
+  std::_Exit(1);
+}
+
 int exit_code_of(ErrorCode code) {
   switch (code) {
     case ErrorCode::kUsage:
@@ -74,6 +98,10 @@ std::unique_ptr<CLI::App> make_program() {
   return program;
 }
 
+void say_why_when_terminated() {
+  std::set_terminate(end_with_reason);
+}
+
 int run_program(int argc, char** argv) {
   const std::unique_ptr<CLI::App> program = make_program();
   const bool as_event = asks_for_events(argc, argv);
@@ -94,6 +122,11 @@ int run_program(int argc, char** argv) {
     const std::string context = context_at_command_line(e, chosen_command(*program));
     return fail(exit_code_of(e.code()), name_of(e.code()), printable(context, 500),
                 printable(e.message(), 2000), as_event);
+  } catch (const std::filesystem::filesystem_error& e) {  // link loops, folders that may not be read
+    const std::string path = e.path2().empty() ? e.path1().string() : e.path2().string();
+    return fail(1, "io", printable(path, 500), e.code().message(), as_event);
+  } catch (const std::system_error& e) {
+    return fail(1, "device", "", refused_by_system(e), as_event);
   } catch (const std::bad_alloc&) {
     return fault("out of memory",
                  "; use fewer or smaller views (--views 4, --resolution 256) or smaller textures "

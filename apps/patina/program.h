@@ -14,4 +14,7 @@ std::unique_ptr<CLI::App> make_program();
 /// done, 1 failed, 2 wrong usage, 130 stopped by the user.
 int run_program(int argc, char** argv);
 
+/// Lets the process say in one line why it ends, with exit code 1, where an exception leaves a thread.
+void say_why_when_terminated();
+
 }  // namespace patina::app

@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <set>
+#include <sstream>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "mini_data/dataset.h"
 #include "mini_data/noise_volume.h"
@@ -13,6 +16,7 @@
 #include "mini_data/recipes.h"
 #include "mini_data/shard.h"
 #include "patina/base/error.h"
+#include "patina/base/files.h"
 #include "patina/base/random.h"
 #include "support.h"
 
@@ -25,8 +29,8 @@ PlaneStack some_planes(int width, int height) {
   const auto count = static_cast<size_t>(width) * static_cast<size_t>(height);
   stack.planes.assign(4, std::vector<float>(count));
   for (size_t i = 0; i < count; ++i) {
-    const auto x = static_cast<float>(i % static_cast<size_t>(width)),
-               y = static_cast<float>(i / static_cast<size_t>(width));
+    const size_t column = i % static_cast<size_t>(width), row = i / static_cast<size_t>(width);
+    const auto x = static_cast<float>(column), y = static_cast<float>(row);
     stack.planes[0][i] = 0.5f + 0.4f * std::sin(0.05f * x + 0.03f * y);
     stack.planes[1][i] = RandomStream(3, RandomPurpose::kTest, i).uniform();
     stack.planes[2][i] = 0.25f;
@@ -236,6 +240,29 @@ TEST_F(Plans, captions_say_what_is_asked_for) {
     for (uint64_t index = 0; index < 30; ++index)
       EXPECT_TRUE(says_any(plan_of(catalog_, recipe.name, 1, 1, index, {}).caption, recipe.words))
           << recipe.name;
+}
+
+// `patina enhance` says of words beyond this list that the model does not know them.
+TEST_F(Plans, words_of_captions_are_those_that_the_model_lists) {
+  const std::filesystem::path model = test::data_dir() / "../../models/patina-mini";
+  const auto vocabulary = nlohmann::json::parse(read_text_file(model / "tokenizer/vocab.json"));
+  std::istringstream lines(read_text_file(model / "words.txt"));
+  const std::set<std::string> listed{std::istream_iterator<std::string>(lines), {}};
+  std::vector<std::string> names = age_names();
+  names.insert(names.end(), clean_names().begin(), clean_names().end());
+  std::set<std::string> taught;
+  for (const std::string& name : names)
+    for (uint64_t index = 0; index < 300; ++index) {
+      std::string caption = plan_of(catalog_, name, static_cast<int>(index % 3), 1, index, {}).caption;
+      std::replace_if(
+          caption.begin(), caption.end(), [](char c) { return c < 'a' || c > 'z'; }, ' ');
+      std::istringstream words(caption);
+      for (std::string word; words >> word;)
+        if (word.size() > 1 && vocabulary.contains(word + "</w>")) taught.insert(word);
+    }
+  taught.erase("plate");  // the object of this test's data
+  EXPECT_GT(taught.size(), 100u);
+  for (const std::string& word : taught) EXPECT_TRUE(listed.count(word)) << word;
 }
 
 TEST_F(Plans, what_a_clean_prompt_leaves_alone_has_one_part_or_two) {

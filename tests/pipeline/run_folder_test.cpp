@@ -228,6 +228,43 @@ TEST(RunFolder, a_picture_that_was_changed_by_hand_is_copied_before_its_stage_ru
   EXPECT_EQ(read_text_file(run.file("detail/edited_01.png")), "painted again");
 }
 
+// A run with other options that is killed while it writes leaves files of both: who comes back to the old
+// options must not get them.
+TEST(RunFolder, a_stage_that_was_killed_while_it_wrote_is_not_taken_for_the_one_before_it) {
+  const test::TemporaryFolder folder;
+  {
+    RunFolder run(folder.path() / "run");
+    CountingStage stage{run};
+    stage("key 1");
+    EXPECT_THROW(run.run_stage("work", "key 2", {},
+                               [&]() -> RunFolder::StageResult {
+                                 write_file(run.output("a.txt"), std::string_view("of key 2"));
+                                 throw Error(ErrorCode::kInterrupted, "", "killed");
+                               }),
+                 Error);
+  }
+  RunFolder run(folder.path() / "run");
+  EXPECT_EQ(run.stage("work"), nullptr);
+  CountingStage stage{run};
+  stage("key 1", "b.txt");
+  EXPECT_EQ(stage.runs, 1);
+  EXPECT_FALSE(std::filesystem::exists(run.file("a.txt")));  // no longer made
+  EXPECT_FALSE(std::filesystem::exists(run.file("a.by-hand.txt")));
+}
+
+TEST(RunFolder, a_stage_that_was_killed_before_it_wrote_leaves_the_one_before_it) {
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  CountingStage stage{run};
+  stage("key 1");
+  EXPECT_THROW(
+      run.run_stage("work", "key 2", {},
+                    []() -> RunFolder::StageResult { throw Error(ErrorCode::kInterrupted, "", "killed"); }),
+      Error);
+  stage("key 1");
+  EXPECT_EQ(stage.runs, 1);
+}
+
 TEST(RunFolder, a_damaged_record_is_refused_with_what_to_do) {
   const test::TemporaryFolder folder;
   const auto refusal = [&](std::string_view text) -> std::string {
@@ -275,6 +312,21 @@ TEST(RunFolder, a_damaged_checkpoint_is_none) {
     write_file(run.file(".work.checkpoint"), std::string_view(text));
     EXPECT_FALSE(run.load_checkpoint("work", "key")) << text;
   }
+}
+
+TEST(RunFolder, a_checkpoint_that_cannot_be_written_is_a_warning) {
+  const test::TemporaryFolder folder;
+  RunFolder run(folder.path() / "run");
+  std::filesystem::create_directories(run.file(".work.checkpoint") / "in the way");
+  std::vector<std::string> warnings;
+  RunProgress progress;
+  progress.on_warning = [&](std::string_view text) { warnings.emplace_back(text); };
+  EXPECT_NO_THROW(run.run_stage("work", "key", progress, [&] {
+    run.save_checkpoint("work", "key", 1, {1, 2, 3});
+    return RunFolder::StageResult{};
+  }));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find(".work.checkpoint"), std::string::npos) << warnings[0];
 }
 
 TEST(RunFolder, outputs_that_a_stage_no_longer_makes_are_removed) {

@@ -6,12 +6,15 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "patina/base/mapped_files.h"
 
 namespace patina {
 namespace {
@@ -24,6 +27,14 @@ namespace fs = std::filesystem;
   throw Error(
       missing ? ErrorCode::kNotFound : ErrorCode::kIo, path.string(),
       missing ? std::string("no such file or folder") : fmt::format("{}: {}", doing, std::strerror(code)));
+}
+
+// A failed write of `bytes` to `path`.
+Error cannot_write(const fs::path& path, int code, uint64_t bytes) {
+  const bool is_full = code == ENOSPC || code == EDQUOT;
+  return Error(ErrorCode::kIo, path.string(),
+               fmt::format("cannot be written: {}{}", std::strerror(code),
+                           is_full ? fmt::format("; the file needs {} bytes", bytes) : std::string()));
 }
 
 // An open file descriptor that closes itself.
@@ -66,6 +77,33 @@ Buffer read_whole(const fs::path& path, uint64_t max_bytes) {
   return buffer;
 }
 
+// The maps that are there, for a signal handler: begin is written last and cleared first.
+struct MapSlot {
+  std::atomic<const uint8_t*> begin{nullptr};
+  std::atomic<const uint8_t*> end{nullptr};
+  std::atomic<const char*> name{nullptr};
+};
+std::array<MapSlot, 256> g_maps;  // files beyond these go unnamed
+
+void add_map(std::span<const uint8_t> bytes, const char* name) {
+  for (MapSlot& slot : g_maps) {
+    const char* is_free = nullptr;
+    if (!slot.name.compare_exchange_strong(is_free, name)) continue;
+    slot.end = bytes.data() + bytes.size();
+    slot.begin = bytes.data();
+    return;
+  }
+}
+
+void remove_map(const uint8_t* begin) {
+  for (MapSlot& slot : g_maps)
+    if (slot.begin == begin) {
+      slot.begin = nullptr;
+      slot.name = nullptr;
+      return;
+    }
+}
+
 std::string hex(XXH128_hash_t hash) {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
@@ -86,10 +124,20 @@ MappedFile::MappedFile(const fs::path& path) : path_(path) {
   void* data = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.fd, 0);
   if (data == MAP_FAILED) throw_errno(path, "cannot be mapped");
   bytes_ = {static_cast<const uint8_t*>(data), size};
+  add_map(bytes_, path_.c_str());
 }
 
 MappedFile::~MappedFile() {
-  if (!bytes_.empty()) ::munmap(const_cast<uint8_t*>(bytes_.data()), bytes_.size());
+  if (bytes_.empty()) return;
+  remove_map(bytes_.data());
+  ::munmap(const_cast<uint8_t*>(bytes_.data()), bytes_.size());
+}
+
+const char* mapped_file_at(const void* address) {
+  for (const MapSlot& slot : g_maps)
+    if (const uint8_t* begin = slot.begin; begin && begin <= address && address < slot.end.load())
+      return slot.name;
+  return nullptr;
 }
 
 void write_file_with(const fs::path& path, const std::function<void(const fs::path&)>& write) {
@@ -116,19 +164,16 @@ void write_file_with(const fs::path& path, const std::function<void(const fs::pa
 void write_file(const fs::path& path, std::span<const uint8_t> bytes) {
   write_file_with(path, [&](const fs::path& temporary) {
     const Descriptor file{::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)};
-    if (file.fd < 0)
-      throw Error(ErrorCode::kIo, path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+    if (file.fd < 0) throw cannot_write(path, errno, bytes.size());
     size_t done = 0;
     while (done < bytes.size()) {
       const ssize_t n = ::write(file.fd, bytes.data() + done, bytes.size() - done);
       if (n < 0 && errno == EINTR) continue;
-      if (n < 0)
-        throw Error(ErrorCode::kIo, path.string(),
-                    fmt::format("cannot be written: {}", std::strerror(errno)));
+      if (n < 0) throw cannot_write(path, errno, bytes.size());
       done += static_cast<size_t>(n);
     }
     if (::fsync(file.fd) != 0 && errno != EINVAL && errno != EROFS)
-      throw Error(ErrorCode::kIo, path.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+      throw cannot_write(path, errno, bytes.size());
   });
 }
 

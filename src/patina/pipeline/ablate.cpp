@@ -11,6 +11,7 @@
 #include "patina/pipeline/ablate_pictures.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/measures.h"
+#include "patina/pipeline/option_kinds.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/stage_key.h"
 #include "patina/report/html.h"
@@ -259,7 +260,7 @@ report::AblationPage make_page(const Workbench& bench, const RenderedViews& view
   for (const char* set_by_the_steps : {"bias", "bias-scaling", "noise", "output", "run", "turntable"})
     page.config.erase(set_by_the_steps);
   page.config["tile-scale"] = find_option("tile-scale")->get(config);
-  page.config["asset"] = config.inputs.asset.string();
+  page.config["asset"] = option_kinds::text_of_path(config.inputs.asset);
   page.config["version"] = PATINA_VERSION;
   page.warnings = bench.warnings;
   if (const StageRecord* render = runs[0].folder->stage("render"))
@@ -302,7 +303,7 @@ json ablate(Config config, const AblationOptions& options, const fs::path& folde
   }
 
   report::AblationPage page = make_page(bench, views, runs, options, config);
-  json result = {{"patina", PATINA_VERSION},      {"asset", config.inputs.asset.string()},
+  json result = {{"patina", PATINA_VERSION},      {"asset", option_kinds::text_of_path(config.inputs.asset)},
                  {"options", page.config},        {"machine", page.machine},
                  {"views", bench.cameras.size()}, {"steps", json::array()},
                  {"view_counts", json::array()}};

@@ -5,12 +5,15 @@
 #include <fmt/format.h>
 
 #include "patina/asset/export.h"
+#include "patina/asset/json_view.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
 #include "patina/diffusion/model.h"
 #include "patina/pipeline/blend.h"
 #include "patina/pipeline/exemplars.h"
+#include "patina/pipeline/known_words.h"
+#include "patina/pipeline/option_kinds.h"
 #include "patina/pipeline/options.h"
 #include "patina/pipeline/part_prompts.h"
 #include "patina/pipeline/variants.h"
@@ -34,6 +37,7 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   check_inputs(config);
   ResolvedModel model(config.edit);
+  warn_of_unknown_words(config.edit, progress);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
   check_export(bench, config.output, progress);
@@ -65,6 +69,7 @@ void run_render(Config config, RunFolder& run, const RunProgress& progress) {
 void run_edit(Config config, RunFolder& run, const RunProgress& progress) {
   settle(config);
   ResolvedModel model(config.edit);
+  warn_of_unknown_words(config.edit, progress);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);
   const Strength strength = mask_stage(bench, config.masks, run, progress);
@@ -133,17 +138,20 @@ fs::path run_folder_path(const Config& config) {
 }
 
 void write_config(const Config& config, RunFolder& run) {
-  const fs::path file = run.file("config.json"), asset = fs::absolute(config.inputs.asset);
+  const fs::path file = run.file("config.json");
+  const std::string asset = option_kinds::text_of_path(fs::absolute(config.inputs.asset));
   const std::string hash = hash_file(config.inputs.asset);
   if (fs::exists(file)) {
     const json before = read_json(file);
-    if (before.value("asset", "") != asset.string() && before.value("asset_hash", "") != hash) run.clear();
+    const auto differs = [&](const char* name, const std::string& value) {
+      return !before.is_object() || !before.contains(name) || before[name] != value;
+    };
+    if (differs("asset", asset) && differs("asset_hash", hash)) run.clear();
   }
   run.keep_what_was_changed_by_hand(config.keep);
-  write_json(file, {{"patina", PATINA_VERSION},
-                    {"asset", asset.string()},
-                    {"asset_hash", hash},
-                    {"options", to_json(config)}});
+  write_json(
+      file,
+      {{"patina", PATINA_VERSION}, {"asset", asset}, {"asset_hash", hash}, {"options", to_json(config)}});
 }
 
 Config read_config(const fs::path& run_folder) {
@@ -154,12 +162,19 @@ Config read_config(const fs::path& run_folder) {
   const json values = read_json(file);
   Config config;
   try {
-    config.inputs.asset = values.at("asset").get<std::string>();
+    config.inputs.asset = option_kinds::path_of_text(values.at("asset").get<std::string>());
     apply_json(config, values.at("options"), file.string());
   } catch (const json::exception& e) {
     throw Error(ErrorCode::kFormat, file.string(),
-                fmt::format("is not a patina configuration: {}", e.what()));
+                fmt::format("is not a patina configuration: {}", asset::json_fault(e)));
   }
+  std::error_code ignored;
+  if (!fs::exists(config.inputs.asset, ignored))
+    throw Error(
+        ErrorCode::kNotFound, file.string(),
+        fmt::format("its asset '{}' is no longer there; put it back, or give its new place to `patina "
+                    "enhance` or `patina render` with this run folder, which go on from here",
+                    printable(config.inputs.asset.string())));
   config.run = run_folder;
   config.keep = false, config.num_seeds = 1;  // asked for anew each time
   return config;

@@ -1,5 +1,8 @@
 #include "patina/pipeline/option_kinds.h"
 
+#include "patina/asset/uri.h"
+#include "patina/base/utf8.h"
+
 namespace patina::pipeline::option_kinds {
 namespace {
 
@@ -24,6 +27,19 @@ void refuse(const Option& option, const json& found) {
               fmt::format("expected {}, found '{}'", option.expected, printable(text)));
 }
 
+constexpr std::string_view kEncoded = "file:";
+
+std::string text_of_path(const std::filesystem::path& path) {
+  std::string text = path.string();
+  if (valid_utf8(text) && !text.starts_with(kEncoded)) return text;
+  return std::string(kEncoded) + asset::percent_encoded(text);
+}
+
+std::filesystem::path path_of_text(const std::string& text) {
+  if (!text.starts_with(kEncoded)) return text;
+  return asset::percent_decoded(std::string_view(text).substr(kEncoded.size()), text);
+}
+
 json shortest(float value) {
   return json::parse(fmt::format("{}", value));
 }
@@ -32,7 +48,7 @@ Kind<std::string> text() {
   return {.kind = ValueKind::kText,
           .expected = "a text",
           .decode = [](const json& value) -> std::optional<std::string> {
-            return value.is_string() ? std::optional(value.get<std::string>()) : std::nullopt;
+            return value.is_string() ? std::optional(as_utf8(value.get<std::string>())) : std::nullopt;
           },
           .encode = [](const std::string& value) { return json(value); }};
 }
@@ -41,10 +57,9 @@ Kind<std::filesystem::path> path() {
   return {.kind = ValueKind::kText,
           .expected = "a path",
           .decode = [](const json& value) -> std::optional<std::filesystem::path> {
-            return value.is_string() ? std::optional<std::filesystem::path>(value.get<std::string>())
-                                     : std::nullopt;
+            return value.is_string() ? std::optional(path_of_text(value.get<std::string>())) : std::nullopt;
           },
-          .encode = [](const std::filesystem::path& value) { return json(value.string()); }};
+          .encode = [](const std::filesystem::path& value) { return json(text_of_path(value)); }};
 }
 
 Kind<bool> truth() {

@@ -24,6 +24,11 @@ using nlohmann::json;
 /// Throws Error{kUsage}: what the option takes, and what it was given.
 [[noreturn]] void refuse(const Option& option, const json& found);
 
+/// A path as text of JSON, and back: as it is, or as "file:" and a percent-encoded path where its bytes are
+/// no UTF-8.
+std::string text_of_path(const std::filesystem::path& path);
+std::filesystem::path path_of_text(const std::string& text);
+
 /// How values of type T stand in files, and which are allowed.
 template <class T>
 struct Kind {

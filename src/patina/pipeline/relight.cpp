@@ -45,7 +45,7 @@ struct Relit {
 };
 
 Relit render_in(const OtherLight& light, const Workbench& bench, const FittedMaterials& fitted,
-                const ReportSettings& settings, const RunFolder& run, std::vector<std::string>& outputs) {
+                const ReportSettings& settings, RunFolder& run, std::vector<std::string>& outputs) {
   const render::Scene::Options options{.bsdf_model = bench.scene->bsdf_model()};
   const render::Scene scenes[] = {
       {bench.asset, bench.maps, light.environment, bench.context.get(), options},
@@ -60,7 +60,7 @@ Relit render_in(const OtherLight& light, const Workbench& bench, const FittedMat
     for (size_t v = 0; v < views[after].size(); ++v) {
       pictures[after].push_back(views::tile_control(views[after][v], relit.exposure_ev));
       outputs.push_back(relit_picture(light, after != 0, v));
-      write_image(run.file(outputs.back()), pictures[after].back());
+      write_image(run.output(outputs.back()), pictures[after].back());
     }
   for (const views::View& view : views[0]) weights.push_back(view.coverage);
   relit.change = differences(views[0], pictures[0], pictures[1], weights, fitted.maps.size());
@@ -98,7 +98,7 @@ std::string relit_picture(const OtherLight& light, bool after, size_t camera) {
 
 json relight(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
              std::span<const Image> rendered, std::span<const Image> weights, const FittedMaterials& fitted,
-             const ReportSettings& settings, const RunFolder& run, std::vector<std::string>& outputs,
+             const ReportSettings& settings, RunFolder& run, std::vector<std::string>& outputs,
              const RunProgress& progress) {
   const size_t num_materials = fitted.maps.size();
   const std::vector<double> error = differences(views.set.views, rendered, edited, weights, num_materials);

@@ -37,7 +37,7 @@ std::string relit_picture(const OtherLight& light, bool after, size_t camera);
 /// (report/color_difference.h), null where no view shows the material.
 nlohmann::json relight(const Workbench& bench, const RenderedViews& views, std::span<const Image> edited,
                        std::span<const Image> rendered, std::span<const Image> weights,
-                       const FittedMaterials& fitted, const ReportSettings& settings, const RunFolder& run,
+                       const FittedMaterials& fitted, const ReportSettings& settings, RunFolder& run,
                        std::vector<std::string>& outputs, const RunProgress& progress);
 
 }  // namespace patina::pipeline

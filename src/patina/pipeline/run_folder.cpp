@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <memory>
 
 #include <fmt/format.h>
 
@@ -61,15 +62,11 @@ std::string checkpoint_name(std::string_view stage) {
 }  // namespace
 
 json read_json(const fs::path& path) {
-  try {
-    return json::parse(read_text_file(path));
-  } catch (const json::exception& e) {
-    throw Error(ErrorCode::kFormat, path.string(), fmt::format("is not valid JSON: {}", e.what()));
-  }
+  return asset::parse_json(read_text_file(path), path.string());
 }
 
 void write_json(const fs::path& path, const json& values) {
-  write_file(path, values.dump(2) + "\n");
+  write_file(path, values.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 RunFolder::Lock::Lock(const fs::path& folder)
@@ -136,10 +133,31 @@ bool RunFolder::is_unused() const {
   return !failure;
 }
 
-const StageRecord* RunFolder::stage(std::string_view name) const {
+StageRecord* RunFolder::find_record(std::string_view name) {
   const auto found =
       std::find_if(stages_.begin(), stages_.end(), [&](const StageRecord& s) { return s.name == name; });
   return found == stages_.end() ? nullptr : &*found;
+}
+
+const StageRecord* RunFolder::stage(std::string_view name) const {
+  const auto found = std::find_if(stages_.begin(), stages_.end(),
+                                  [&](const StageRecord& s) { return s.name == name && !s.key.empty(); });
+  return found == stages_.end() ? nullptr : &*found;
+}
+
+fs::path RunFolder::output(std::string_view relative) {
+  if (StageRecord* earlier = find_record(running_); earlier && !earlier->key.empty()) {
+    // The names stay, so that what the next run does not make again is removed. Their hashes go: a file that
+    // differs from them need not have been changed by hand.
+    *earlier = {.name = running_,
+                .key = {},
+                .outputs = std::move(earlier->outputs),
+                .hashes = {},
+                .metrics = json::object(),
+                .warnings = {}};
+    write_records();
+  }
+  return path_ / relative;
 }
 
 bool RunFolder::is_complete(const StageRecord& stage) const {
@@ -149,12 +167,14 @@ bool RunFolder::is_complete(const StageRecord& stage) const {
 
 // A stage takes its old place; what follows it is judged by its own key.
 void RunFolder::set_record(StageRecord record) {
-  const auto place = std::find_if(stages_.begin(), stages_.end(),
-                                  [&](const StageRecord& s) { return s.name == record.name; });
-  if (place == stages_.end())
-    stages_.push_back(std::move(record));
-  else
+  if (StageRecord* place = find_record(record.name))
     *place = std::move(record);
+  else
+    stages_.push_back(std::move(record));
+  write_records();
+}
+
+void RunFolder::write_records() const {
   json list = json::array();
   for (const StageRecord& stage : stages_) list.push_back(to_json(stage));
   write_json(path_ / "stages.json", list);
@@ -180,8 +200,11 @@ const StageRecord& RunFolder::run_stage(std::string_view name, const std::string
   progress.tell_stage(name, StageEvent::kStarted);
   start_ = std::chrono::steady_clock::now();
   earlier_seconds_ = earlier_peak_mb_ = 0;
-  const StageRecord before = stage(name) ? *stage(name) : StageRecord{};
+  const StageRecord before = find_record(name) ? *find_record(name) : StageRecord{};
   const std::vector<ChangedByHand> changed = copy_what_was_changed_by_hand(before);
+  running_ = name, progress_ = &progress;
+  const auto stop_running = [this](void*) { running_.clear(), progress_ = nullptr; };
+  const std::unique_ptr<void, decltype(stop_running)> until_the_end(this, stop_running);
   StageResult result = work();
   std::error_code ignored;
   for (const std::string& output : before.outputs)  // e.g. textures of materials that are no longer chosen
@@ -261,7 +284,12 @@ void RunFolder::save_checkpoint(std::string_view stage, const std::string& key, 
   const std::string header = values.dump() + "\n";
   std::vector<uint8_t> file(header.begin(), header.end());
   file.insert(file.end(), bytes.begin(), bytes.end());
-  write_file(path_ / checkpoint_name(stage), file);
+  try {
+    write_file(path_ / checkpoint_name(stage), file);
+  } catch (const Error& e) {
+    if (progress_)
+      progress_->warn(fmt::format("{}; if the run is stopped, this stage starts anew", e.what()));
+  }
 }
 
 std::optional<RunFolder::SavedCheckpoint> RunFolder::load_checkpoint(std::string_view stage,

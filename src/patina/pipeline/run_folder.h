@@ -26,7 +26,7 @@ namespace patina::pipeline {
 /// What a stage left behind besides its files.
 struct StageRecord {
   std::string name;
-  std::string key;                   // hash of everything the stage read
+  std::string key;                   // hash of everything the stage read; empty: it was killed while it wrote
   std::vector<std::string> outputs;  // paths relative to the run folder
   std::vector<std::string> hashes;   // of the outputs as the stage wrote them
   double seconds = 0;                // with those spent before the last checkpoint of a run that was killed
@@ -50,6 +50,9 @@ class RunFolder {
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path file(std::string_view relative) const { return path_ / relative; }
+  /// Where the running stage writes an output of that name. From the first one on, what an earlier run of the
+  /// stage has left is no longer whole, so its record ends: a run that is killed here is not taken for it.
+  std::filesystem::path output(std::string_view relative);
 
   /// Runs `work` unless the last run of the stage had the same key and all its outputs are still there.
   /// `work` writes its files and returns their paths relative to the folder, with metrics and warnings.
@@ -80,7 +83,7 @@ class RunFolder {
 
   /// Partial results of a long stage, kept under the stage's key: a checkpoint written for other inputs is
   /// not returned. Both are for the `work` of run_stage: time and memory spent until the checkpoint go with
-  /// it into the stage's record.
+  /// it into the stage's record. A checkpoint that cannot be written is a warning: the stage goes on.
   void save_checkpoint(std::string_view stage, const std::string& key, int step,
                        const std::vector<uint8_t>& bytes) const;
   struct SavedCheckpoint {
@@ -103,6 +106,8 @@ class RunFolder {
   };
   bool is_complete(const StageRecord& stage) const;
   bool is_unused() const;
+  StageRecord* find_record(std::string_view name);
+  void write_records() const;
   struct ChangedByHand {
     std::string output, copy;
   };
@@ -116,7 +121,10 @@ class RunFolder {
   std::optional<Lock> lock_;
   bool keep_ = false;
   std::vector<StageRecord> stages_;
-  // Of the stage that is running: when it started here, and what a killed run had spent on it.
+  // Of the stage that is running: its name (empty: none is), when it started here, and what a killed run had
+  // spent on it.
+  std::string running_;
+  const RunProgress* progress_ = nullptr;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double earlier_seconds_ = 0, earlier_peak_mb_ = 0;
 };

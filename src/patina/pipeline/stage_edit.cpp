@@ -178,21 +178,21 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
       if (!strength.views.empty())
         restore_masked(edited[v], views.tile[v], strength.views[v], model.latent_scale());
       result.outputs.push_back(numbered("detail/edited", v, ".png"));
-      write_image(run.file(result.outputs.back()), edited[v]);
+      write_image(run.output(result.outputs.back()), edited[v]);
     }
     for (size_t v = 0; v < strength.views.size(); ++v) {
       result.outputs.push_back(numbered("detail/strength", v, ".png"));
-      write_image(run.file(result.outputs.back()), strength_picture(strength.views[v]));
+      write_image(run.output(result.outputs.back()), strength_picture(strength.views[v]));
     }
     const std::vector<Image> parts = part_pictures(prepared.inputs.part_views, views.tile);
     for (size_t v = 0; v < parts.size(); ++v) {
       result.outputs.push_back(numbered("detail/parts", v, ".png"));
-      write_image(run.file(result.outputs.back()), parts[v]);
+      write_image(run.output(result.outputs.back()), parts[v]);
     }
     json shown = json::array();  // what the report says of the exemplars
     for (size_t i = 0; i < prepared.inputs.exemplars.size(); ++i) {
       result.outputs.push_back(numbered("detail/exemplar", i, ".png"));
-      write_image(run.file(result.outputs.back()), prepared.inputs.exemplars[i].picture);
+      write_image(run.output(result.outputs.back()), prepared.inputs.exemplars[i].picture);
       shown.push_back({{"file", result.outputs.back()}, {"caption", printable(settings.exemplars[i])}});
     }
     const diffusion::Guidance guidance = diffusion::guidance_of(model, options);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <functional>
 
 #include "patina/asset/map_slots.h"
 #include "patina/base/error.h"
@@ -27,19 +28,21 @@ constexpr float kTooCoarse = 0.5f;
 // other options, to which the user may come back.
 constexpr const char *kFolder = "textures", *kBeforeFolder = "textures/before", *kPreviewFolder = "preview";
 
-// Writes every changed map to `folder`; says which files and of what (the metric "maps").
+// Writes every changed map where `place` puts its name in `folder`; says which files and of what (the metric
+// "maps").
 struct WrittenMaps {
   std::vector<std::string> files;
   json entries = json::array();
 };
 WrittenMaps write_maps(std::span<const asset::MaterialMaps> maps, std::span<const asset::MapSet> changed,
-                       const RunFolder& run, const char* folder) {
+                       const char* folder,
+                       const std::function<std::filesystem::path(const std::string&)>& place) {
   WrittenMaps written;
   for (size_t m = 0; m < maps.size(); ++m)
     for (const asset::MapSlotRow& slot : asset::kMapSlots) {
       if (!has(changed[m], slot.slot)) continue;
       const std::string file = material_file(folder, m, maps[m].name, slot.name);
-      write_image(run.file(file), asset::picture_of(slot_map(maps[m], slot.slot).texels, slot.encoding));
+      write_image(place(file), asset::picture_of(slot_map(maps[m], slot.slot).texels, slot.encoding));
       written.files.push_back(file);
       written.entries.push_back({{"material", m}, {"slot", slot.name}, {"file", file}});
     }
@@ -107,16 +110,18 @@ FittedMaterials fit_stage(const Workbench& bench, const Strength& strength, cons
       progress.tell_preview(page);
     };
     hooks.on_stop = [&](const inverse::FitResult& so_far) {
-      (void)write_maps(so_far.maps, so_far.changed, run, kPreviewFolder);
+      (void)write_maps(so_far.maps, so_far.changed, kPreviewFolder,
+                       [&](const std::string& file) { return run.file(file); });
     };
     const inverse::FitResult fitted = inverse::fit_materials(
         *bench.scene, {views.set, edited, strength.enhanced, strength.maps, views.tile}, settings.options,
         hooks, progress);
 
     RunFolder::StageResult result;
-    WrittenMaps written = write_maps(fitted.maps, fitted.changed, run, kFolder);
+    const auto output = [&](const std::string& file) { return run.output(file); };
+    WrittenMaps written = write_maps(fitted.maps, fitted.changed, kFolder, output);
     result.outputs = std::move(written.files);
-    const WrittenMaps before = write_maps(bench.maps, fitted.changed, run, kBeforeFolder);
+    const WrittenMaps before = write_maps(bench.maps, fitted.changed, kBeforeFolder, output);
     result.outputs.insert(result.outputs.end(), before.files.begin(), before.files.end());
     result.metrics["maps"] = std::move(written.entries);
     result.metrics["density"] = json::array();

@@ -238,7 +238,7 @@ Strength mask_stage(const Workbench& bench, const MaskSettings& settings, RunFol
     for (size_t m = 0; m < maps.size(); ++m) {
       if (!maps[m]) continue;
       result.outputs.push_back(material_file("masks", m, bench.maps[m].name, "strength"));
-      write_image(run.file(result.outputs.back()), maps[m]->texels);
+      write_image(run.output(result.outputs.back()), maps[m]->texels);
       result.metrics["maps"].push_back({{"material", m}, {"file", result.outputs.back()}});
     }
     return result;

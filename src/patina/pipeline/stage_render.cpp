@@ -1,12 +1,14 @@
 // The first stage: the asset seen from every camera, as radiance and as the two control images.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "patina/base/error.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/stage_key.h"
 #include "patina/pipeline/stages.h"
+#include "patina/views/visibility.h"
 
 namespace patina::pipeline {
 
@@ -33,14 +35,34 @@ Image read_rgb_sized(const fs::path& path, int width, int height) {
 
 namespace {
 
+// What to do where a part of the surface is not seen for a reason that more views would not mend; empty:
+// there is none such.
+std::string advice_on_unseen(const Workbench& bench) {
+  constexpr float kMuch = 0.1f;
+  const views::UnseenCauses causes = views::unseen_causes(*bench.scene, bench.cameras);
+  if (causes.turned_away > std::max(causes.transparent, kMuch))
+    return fmt::format(
+        "Of {:.0f} % of the surface the views see only the back: its faces point inwards. Turn them round "
+        "(Blender: Edit Mode, Mesh > Normals > Recalculate Outside), or make the material double-sided.",
+        100 * causes.turned_away);
+  if (causes.transparent > kMuch)
+    return fmt::format(
+        "{:.0f} % of the surface is not seen because it is transparent (alpha below 0.5, or below the "
+        "cutoff); make it opaque to have it enhanced.",
+        100 * causes.transparent);
+  return "";
+}
+
 json coverage_metrics(const Workbench& bench, const RunProgress& progress,
                       std::vector<std::string>& warnings) {
   const float seen = views::seen_share(*bench.scene, bench.cameras);
   if (seen < 0.85f) {
-    warnings.push_back(
-        fmt::format("The views see {:.0f} % of the surface. More views (16) or several elevations (-20, 20 "
-                    "and 50) see more. Unseen surface is filled with the change around it, or kept.",
-                    100 * seen));
+    const std::string advice = advice_on_unseen(bench);
+    warnings.push_back(fmt::format(
+        "The views see {:.0f} % of the surface. {} Unseen surface is filled with the change around it, or "
+        "kept.",
+        100 * seen,
+        advice.empty() ? "More views (16) or several elevations (-20, 20 and 50) see more." : advice));
     progress.warn(warnings.back());
   }
   return {{"coverage", seen}, {"coverage_twice", views::seen_share(*bench.scene, bench.cameras, 2)}};
@@ -53,10 +75,10 @@ void require_seen(const Workbench& bench, const views::ViewSet& set) {
       if (material >= 0 && static_cast<size_t>(material) < bench.chosen.size() &&
           bench.chosen[static_cast<size_t>(material)])
         return;
-  throw Error(
-      ErrorCode::kFormat, bench.asset.path.string(),
-      "no pixel of any view shows a material that may change, so nothing would be enhanced; check the "
-      "cameras, the materials that were chosen, and whether faces point outwards");
+  const std::string advice = advice_on_unseen(bench);
+  throw Error(ErrorCode::kFormat, bench.asset.path.string(),
+              "no pixel of any view shows a material that may change, so nothing would be enhanced. " +
+                  (advice.empty() ? "Check the cameras and the materials that were chosen." : advice));
 }
 
 }  // namespace
@@ -73,7 +95,7 @@ RenderedViews render_stage(const Workbench& bench, const RenderSettings& setting
 
     RunFolder::StageResult result;
     const auto write = [&](const std::string& name, const Image& image) {
-      write_image(run.file(name), image);
+      write_image(run.output(name), image);
       result.outputs.push_back(name);
     };
     for (size_t v = 0; v < set.views.size(); ++v) {
@@ -85,7 +107,7 @@ RenderedViews render_stage(const Workbench& bench, const RenderSettings& setting
     cameras["exposure_ev"] = set.exposure_ev;
     const glm::dvec3& origin = bench.asset.origin;
     if (origin != glm::dvec3(0.0)) cameras["origin"] = {origin.x, origin.y, origin.z};
-    write_json(run.file("views/cameras.json"), cameras);
+    write_json(run.output("views/cameras.json"), cameras);
     result.outputs.push_back("views/cameras.json");
     result.metrics = coverage_metrics(bench, progress, result.warnings);
     result.metrics["exposure_ev"] = set.exposure_ev;

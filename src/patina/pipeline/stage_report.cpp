@@ -97,7 +97,7 @@ void write_turntable(const Workbench& bench, const render::Scene& after, float e
 RunFolder::StageResult measure_result(const Workbench& bench, const Strength& strength,
                                       const RenderedViews& views, std::span<const Image> edited,
                                       const FittedMaterials& fitted, const ReportSettings& settings,
-                                      const RunFolder& run, const RunProgress& progress) {
+                                      RunFolder& run, const RunProgress& progress) {
   RunFolder::StageResult result;
   const render::Scene after(bench.asset, fitted.maps, bench.scene->environment(), bench.context.get(),
                             {.bsdf_model = bench.scene->bsdf_model()});
@@ -110,7 +110,7 @@ RunFolder::StageResult measure_result(const Workbench& bench, const Strength& st
   for (size_t v = 0; v < rendered.views.size(); ++v) {
     pictures.push_back(views::tile_control(rendered.views[v], views.set.exposure_ev));
     result.outputs.push_back(numbered("report/rendered", v, ".png"));
-    write_image(run.file(result.outputs.back()), pictures.back());
+    write_image(run.output(result.outputs.back()), pictures.back());
   }
   const std::vector<Image> weights = measure_weights(strength, views, settings.boundary_pixels);
   result.metrics["consistency"] = consistency_metrics(bench, views, edited);
@@ -124,7 +124,8 @@ RunFolder::StageResult measure_result(const Workbench& bench, const Strength& st
       relight(bench, views, edited, pictures, weights, fitted, settings, run, result.outputs, progress);
   if (settings.turntable_frames > 0) {
     result.outputs.push_back("turntable.webp");
-    write_turntable(bench, after, views.set.exposure_ev, settings, run.file(result.outputs.back()), progress);
+    write_turntable(bench, after, views.set.exposure_ev, settings, run.output(result.outputs.back()),
+                    progress);
   }
   return result;
 }

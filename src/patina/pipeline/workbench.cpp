@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "patina/asset/json_view.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/text.h"
 #include "patina/image/image_io.h"
 #include "patina/pipeline/run_folder.h"
 
@@ -64,22 +66,26 @@ void add_asset(Hasher& hasher, const asset::Asset& asset, const std::vector<asse
                            light.outer_cone_angle));
 }
 
-// "'body', 'lid'": at most ten, so that a message stays readable.
+// "0 'body', 1 'lid'": at most ten, so that a message stays readable.
 std::string quoted_names(const std::vector<asset::Material>& materials) {
   std::string list;
   for (size_t i = 0; i < std::min<size_t>(materials.size(), 10); ++i)
-    list += fmt::format("{}'{}'", i ? ", " : "", printable(materials[i].name, 60));
+    list += fmt::format("{}{} '{}'", i ? ", " : "", i, printable(materials[i].name, 60));
   return materials.size() > 10 ? list + ", ..." : list;
 }
 
-// Marks the used materials of that name. A name that no material has and that holds commas is a list of
-// names.
+// Marks the used materials of that name. A name that no material has is an index, which tells materials of
+// one name apart, or, with commas, a list of names.
 void mark_named(const asset::Asset& asset, const std::vector<bool>& used, const std::string& name,
                 const char* option, std::vector<bool>& wanted) {
   bool found = false;
   for (size_t m = 0; m < asset.materials.size(); ++m)
     if (used[m] && asset.materials[m].name == name) wanted[m] = found = true;
   if (found) return;
+  if (const auto index = parse_number<size_t>(name); index && *index < used.size() && used[*index]) {
+    wanted[*index] = true;
+    return;
+  }
   if (const size_t comma = name.find(','); comma != std::string::npos) {
     mark_named(asset, used, name.substr(0, comma), option, wanted);
     mark_named(asset, used, name.substr(comma + 1), option, wanted);
@@ -155,6 +161,23 @@ render::Environment open_environment(const std::filesystem::path& path, std::vec
   return render::Environment(std::move(hdr.image));
 }
 
+// In the dark every view would be black, and nothing could be seen of a change.
+void require_light(const InputSettings& inputs, const render::Environment& environment,
+                   const Workbench& bench, std::span<const asset::MaterialMaps> context_maps) {
+  const auto glows = [](const asset::MaterialMaps& maps) {
+    const auto& pixels = maps.emission.texels.pixels;
+    return std::any_of(pixels.begin(), pixels.end(), [](float value) { return value > 0; });
+  };
+  if (environment.mean_radiance() > 0 || !bench.asset.lights.empty() ||
+      (bench.context && !bench.context->lights.empty()) ||
+      std::any_of(bench.maps.begin(), bench.maps.end(), glows) ||
+      std::any_of(context_maps.begin(), context_maps.end(), glows))
+    return;
+  throw Error(ErrorCode::kFormat, inputs.environment.string(),
+              "is black, and the asset has no light of its own, so that every view would be black; choose "
+              "another environment");
+}
+
 }  // namespace
 
 std::vector<bool> named_materials(const asset::Asset& asset, const std::vector<std::string>& names,
@@ -202,6 +225,7 @@ Workbench open_workbench(const InputSettings& inputs, const Progress& progress) 
     context_maps = asset::resolve_materials(*bench.context);
   }
   render::Environment environment = open_environment(inputs.environment, bench.warnings);
+  require_light(inputs, environment, bench, context_maps);
   for (const std::string& warning : bench.warnings) progress.warn(warning);
 
   Hasher hasher;
@@ -258,7 +282,7 @@ std::vector<render::Camera> cameras_from_json(const json& values, const std::str
         camera.world_from_camera[i / 4][i % 4] = matrix[static_cast<size_t>(i)].get<float>();
       for (int i = 0; i < 3; ++i)
         camera.world_from_camera[3][i] = static_cast<float>(
-            matrix[static_cast<size_t>(12 + i)].get<double>() + (file_origin[i] - origin[i]));
+            matrix[size_t{12} + static_cast<size_t>(i)].get<double>() + (file_origin[i] - origin[i]));
       camera.fov_y = glm::radians(entry.at("fov_degrees").get<float>());
       camera.width = entry.at("width").get<int>();
       camera.height = entry.at("height").get<int>();
@@ -281,7 +305,8 @@ std::vector<render::Camera> cameras_from_json(const json& values, const std::str
       cameras.push_back(camera);
     }
   } catch (const json::exception& e) {
-    throw Error(ErrorCode::kFormat, context, fmt::format("is not a list of cameras: {}", e.what()));
+    throw Error(ErrorCode::kFormat, context,
+                fmt::format("is not a list of cameras: {}", asset::json_fault(e)));
   }
   const auto side = static_cast<size_t>(std::lround(std::sqrt(static_cast<double>(cameras.size()))));
   if (cameras.empty() || side * side != cameras.size() || side > 4)

@@ -148,6 +148,31 @@ float seen_share(const render::Scene& scene, std::span<const render::Camera> cam
                             static_cast<double>(SurfacePoints::kCount));
 }
 
+UnseenCauses unseen_causes(const render::Scene& scene, std::span<const render::Camera> cameras) {
+  const SurfacePoints points(scene, -1);
+  if (points.empty()) return {};
+  std::atomic<int64_t> turned_away{0}, transparent{0};
+  parallel_for(0, SurfacePoints::kCount, 1024, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const SurfacePoints::Point point = points[i];
+      const auto any = [&](const auto& test) { return std::any_of(cameras.begin(), cameras.end(), test); };
+      if (any([&](const render::Camera& camera) { return is_seen(scene, camera, point); })) continue;
+      if (any([&](const render::Camera& camera) {
+            return seen_at(scene, camera, point.p_world, point.n_world).has_value();
+          }))
+        ++transparent;  // it was not seen, so no ray stops there
+      else if (any([&](const render::Camera& camera) {
+                 return seen_at(scene, camera, point.p_world, -point.n_world).has_value();
+               }))
+        ++turned_away;
+    }
+  });
+  const auto share = [](int64_t count) {
+    return static_cast<float>(static_cast<double>(count) / static_cast<double>(SurfacePoints::kCount));
+  };
+  return {share(turned_away), share(transparent)};
+}
+
 UnseenSurface unseen_surface(const render::Scene& scene, std::span<const render::Camera> cameras) {
   const SurfacePoints points(scene, -1);
   if (points.empty()) return {};

@@ -35,6 +35,13 @@ struct UnseenSurface {
 };
 UnseenSurface unseen_surface(const render::Scene& scene, std::span<const render::Camera> cameras);
 
+/// Why surface is not seen by any camera although nothing lies in front of it, as shares of the asset's area:
+/// only its back shows, or it is transparent.
+struct UnseenCauses {
+  float turned_away = 0, transparent = 0;
+};
+UnseenCauses unseen_causes(const render::Scene& scene, std::span<const render::Camera> cameras);
+
 /// True if nothing lies between the eye and p; neither facing nor the image's frame is asked for.
 bool unoccluded(const render::Scene& scene, const vec3& eye, const vec3& p_world);
 
