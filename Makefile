@@ -3,6 +3,8 @@
 #   make build   build/release/patina
 #   make demo    build, then the main job on examples/kettle.glb
 #   make check   build, then every test; ends with "N passed, N failed, N skipped"
+#   make package            an archive, a wheel and a .deb that run without anything installed (docs/packaging.md)
+#   make check-package      runs them in empty systems; must be root
 #   make check-blender      the tests of the Blender extension, in Blender without a window (docs/blender.md)
 #   make blender-extension  build/blender/patina_enhance.zip, which Blender installs
 #   make sanitise     the suites that finish in minutes, under the address and undefined-behaviour sanitisers
@@ -33,7 +35,7 @@ MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: help build check check-blender blender-extension sanitise fuzz kill-campaign fault-campaign demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build package check-package check check-blender blender-extension sanitise fuzz kill-campaign fault-campaign demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -49,6 +51,14 @@ check: setup
 	@cmake --preset release -DPATINA_BUILD_TESTS=ON -DPATINA_BUILD_BENCH=OFF -DPATINA_BUILD_MINI=$(MINI)
 	@cmake --build build/release --parallel $(JOBS)
 	@scripts/run_tests.sh build/release
+
+package: build
+	@scripts/setup.sh --package
+	@packaging/bundle.py build/release build/package/tree
+	@packaging/archives.py build/package/tree build/package
+
+check-package: package
+	@packaging/check.sh build/release build/package
 
 check-blender: build
 	@scripts/check_blender.sh

@@ -19,10 +19,21 @@ endforeach()
 
 install(TARGETS patina_all patina_options patina_torch ${patina_libraries} EXPORT patina_targets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-install(TARGETS patina RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+# Component program is what a package holds beside the libraries of others (packaging/).
+install(TARGETS patina RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT program)
 install(DIRECTORY "${CMAKE_SOURCE_DIR}/src/patina" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
   FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY "${CMAKE_SOURCE_DIR}/models/patina-mini" DESTINATION "${CMAKE_INSTALL_DATADIR}/patina/models")
+install(DIRECTORY "${CMAKE_SOURCE_DIR}/models/patina-mini" DESTINATION "${CMAKE_INSTALL_DATADIR}/patina/models"
+  COMPONENT program)
+install(FILES "${CMAKE_SOURCE_DIR}/examples/kettle.glb" DESTINATION "${CMAKE_INSTALL_DATADIR}/patina/examples"
+  COMPONENT program)
+install(FILES "${CMAKE_SOURCE_DIR}/README.md" "${CMAKE_SOURCE_DIR}/CHANGELOG.md" "${CMAKE_SOURCE_DIR}/LICENSE"
+  DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT program)
+
+# A package brings the libraries of others in lib/patina. A RUNPATH would hold for the program's own libraries and not
+# for what those ask for, and would come after LD_LIBRARY_PATH, in which many a shell holds an older libstdc++.
+set_target_properties(patina PROPERTIES INSTALL_RPATH "$ORIGIN/../lib/patina")
+target_link_options(patina PRIVATE LINKER:--disable-new-dtags)
 
 set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/patina")
 install(EXPORT patina_targets NAMESPACE patina:: FILE patina-targets.cmake DESTINATION "${package_folder}")

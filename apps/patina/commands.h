@@ -15,5 +15,6 @@ void add_ablate(CLI::App& program);
 void add_show_attention(CLI::App& program);
 void add_info(CLI::App& program);
 void add_models(CLI::App& program);
+void add_doctor(CLI::App& program);
 
 }  // namespace patina::app

@@ -95,6 +95,7 @@ std::unique_ptr<CLI::App> make_program() {
   add_show_attention(*program);
   add_info(*program);
   add_models(*program);
+  add_doctor(*program);
   return program;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "patina/base/portable_math.h"
 #include "patina/base/random.h"
 
 namespace patina {
@@ -24,6 +25,17 @@ TEST(OrthonormalBasis, is_orthonormal_and_right_handed_for_every_direction) {
     EXPECT_NEAR(glm::dot(t, n), 0, 1e-5f);
     EXPECT_NEAR(glm::dot(b, n), 0, 1e-5f);
     EXPECT_NEAR(glm::length(glm::cross(t, b) - n), 0, 2e-5f) << n.x << ' ' << n.y << ' ' << n.z;
+  }
+}
+
+TEST(PortableMath, rounds_to_the_nearest_float) {
+  RandomStream random(1, RandomPurpose::kTest, 1);
+  for (int i = 0; i < 100000; ++i) {
+    const float x = random.gaussian(), y = random.gaussian();
+    const auto x_long = static_cast<long double>(x), y_long = static_cast<long double>(y);
+    ASSERT_EQ(portable::cbrt(x), static_cast<float>(std::cbrt(x_long))) << x;
+    ASSERT_EQ(portable::atan2(y, x), static_cast<float>(std::atan2(y_long, x_long))) << y << ' ' << x;
+    ASSERT_EQ(portable::tan(x), static_cast<float>(std::tan(x_long))) << x;
   }
 }
 

@@ -24,8 +24,8 @@ const fs::path kRoot = PATINA_SOURCE_DIR;
 constexpr int kColumns = 100;
 
 // Folders whose files the pages may name, from the root.
-constexpr std::array kFolders{"apps", "bench",  "blender", "cmake", "docs",  "examples",
-                              "mini", "models", "scripts", "src",   "tests", "tools"};
+constexpr std::array kFolders{"apps",   "bench",     "blender", "cmake", "docs",  "examples", "mini",
+                              "models", "packaging", "scripts", "src",   "tests", "tools"};
 
 struct Line {
   int number;

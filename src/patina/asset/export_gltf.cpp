@@ -13,6 +13,7 @@
 #include "patina/asset/uri.h"
 #include "patina/base/check.h"
 #include "patina/base/files.h"
+#include "patina/base/portable_math.h"
 #include "patina/image/image_header.h"
 #include "patina/image/image_io.h"
 
@@ -77,7 +78,7 @@ int wrap_number(Wrap wrap) {
 // A matrix as KHR_texture_transform's offset, rotation and scale.
 Json transform_json(const mat3& m, const std::string& name) {
   const float scale_x = std::hypot(m[0].x, m[0].y);
-  const float angle = std::atan2(-m[0].y, m[0].x);
+  const float angle = portable::atan2(-m[0].y, m[0].x);
   const float c = std::cos(angle), s = std::sin(angle);
   const float scale_y = s * m[1].x + c * m[1].y, shear = c * m[1].x - s * m[1].y;
   if (std::abs(shear) > 1e-4f * std::max(scale_x, std::abs(scale_y)))

@@ -27,5 +27,8 @@ int64_t peak_resident_bytes() {
 int64_t available_bytes() {
   return bytes_in("/proc/meminfo", "MemAvailable:");
 }
+int64_t total_bytes() {
+  return bytes_in("/proc/meminfo", "MemTotal:");
+}
 
 }  // namespace patina

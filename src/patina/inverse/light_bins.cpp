@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "patina/base/portable_math.h"
 #include "patina/image/color.h"
 #include "patina/render/frame.h"
 
@@ -64,7 +65,7 @@ size_t bin_of(const BinFrame& frame, const vec3& wi) {
   while (ring + 1 < kRings.size() && cosine < table.cosine[ring]) ++ring;
   const int sectors = kRings[ring].sectors;
   if (sectors == 1) return table.first_bin[ring];
-  const float turn = std::atan2(glm::dot(frame.y, half), glm::dot(frame.x, half)) / (2.0f * kPi) + 0.5f;
+  const float turn = portable::atan2(glm::dot(frame.y, half), glm::dot(frame.x, half)) / (2.0f * kPi) + 0.5f;
   const int sector = std::min(static_cast<int>(turn * static_cast<float>(sectors)), sectors - 1);
   return table.first_bin[ring] + static_cast<size_t>(sector);
 }

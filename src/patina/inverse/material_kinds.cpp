@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "patina/base/parallel.h"
+#include "patina/base/portable_math.h"
 #include "patina/base/random.h"
 #include "patina/image/color.h"
 #include "patina/image/image.h"
@@ -59,8 +60,8 @@ MaterialKinds::Feature MaterialKinds::feature_of(const CachePixel& pixel, const 
     const float mapped = std::min(pixel.target[c], 0.95f);
     const float edited = mapped / (1.0f - mapped) / gain;
     const float light = clean_radiance[c] + 0.02f * clean_luminance + 1e-4f;
-    feature[static_cast<size_t>(c)] = std::cbrt(std::clamp((base + kDark) * edited / light, 0.0f, 1.0f));
-    feature[static_cast<size_t>(c) + 3] = std::cbrt(base);
+    feature[static_cast<size_t>(c)] = portable::cbrt(std::clamp((base + kDark) * edited / light, 0.0f, 1.0f));
+    feature[static_cast<size_t>(c) + 3] = portable::cbrt(base);
   }
   feature[6] = kOfSurface * sample.base.roughness;
   feature[7] = kOfSurface * sample.base.metallic;

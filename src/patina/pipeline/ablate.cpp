@@ -1,6 +1,5 @@
 #include "patina/pipeline/ablate.h"
 
-#include <fstream>
 #include <memory>
 #include <set>
 
@@ -8,6 +7,7 @@
 
 #include "patina/base/error.h"
 #include "patina/base/parallel.h"
+#include "patina/base/processor.h"
 #include "patina/pipeline/ablate_pictures.h"
 #include "patina/pipeline/enhance.h"
 #include "patina/pipeline/measures.h"
@@ -141,14 +141,7 @@ json to_json(const report::ViewCountRow& row) {
 
 // The processor's name and the threads in use, without which seconds say little.
 std::string machine_name() {
-  std::ifstream info("/proc/cpuinfo");
-  std::string name = "this machine";
-  for (std::string line; std::getline(info, line);)
-    if (line.starts_with("model name") && line.find(": ") != std::string::npos) {
-      name = line.substr(line.find(": ") + 2);
-      break;
-    }
-  return fmt::format("{}, {} thread{}", name, num_threads(), num_threads() == 1 ? "" : "s");
+  return fmt::format("{}, {} thread{}", processor_name(), num_threads(), num_threads() == 1 ? "" : "s");
 }
 
 report::ViewCountRow view_count_row(const Run& run) {

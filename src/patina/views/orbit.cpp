@@ -5,6 +5,7 @@
 #include <string>
 
 #include "patina/base/error.h"
+#include "patina/base/portable_math.h"
 #include "patina/views/view_set.h"
 
 namespace patina::views {
@@ -59,7 +60,7 @@ struct Framing {
 // |x - s| ≤ slope · (d - z). Of all vertices two decide, those of the largest slope · z + x and slope · z -
 // x: s lies in the middle of the two, and half of their sum is slope · d.
 Framing framing_of(const asset::Asset& asset, const vec3& center, const vec3& axis, float fov_y) {
-  const float slope = (1.0f - 2.0f * kMargin) * std::tan(0.5f * fov_y);
+  const float slope = (1.0f - 2.0f * kMargin) * portable::tan(0.5f * fov_y);
   const mat4 world_from_camera = render::look_at(axis, vec3(0), fov_y, 1, 1).world_from_camera;
   Framing framing;
   for (const vec3& across : {vec3(world_from_camera[0]), vec3(world_from_camera[1])}) {
