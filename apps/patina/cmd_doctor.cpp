@@ -1,7 +1,6 @@
 // patina doctor: what patina finds on this machine, and what to do about each problem.
 #include <unistd.h>
 
-#include <ATen/Context.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -14,6 +13,7 @@
 #include "patina/base/processor.h"
 #include "patina/diffusion/check_model.h"
 #include "patina/diffusion/list_models.h"
+#include "patina/diffusion/model.h"
 
 namespace patina::app {
 namespace {
@@ -82,7 +82,7 @@ void examine_memory(Examination& examination) {
 void examine_gpu(Examination& examination) {
   std::error_code ignored;
   const bool has_card = fs::exists("/proc/driver/nvidia/version", ignored);
-  if (at::hasCUDA())
+  if (diffusion::has_cuda())
     examination.fact("GPU", "NVIDIA; networks run there, unless --device cpu says otherwise");
   else if (has_card)
     examination.fact(

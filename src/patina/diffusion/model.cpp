@@ -21,7 +21,7 @@ namespace {
 constexpr int64_t kLargeNetwork = 5'000'000;  // parameters
 
 Device resolve(Device wanted) {
-  return wanted == Device::kAuto ? (at::hasCUDA() ? Device::kCuda : Device::kCpu) : wanted;
+  return wanted == Device::kAuto ? (has_cuda() ? Device::kCuda : Device::kCpu) : wanted;
 }
 
 /// bf16 pays where the processor multiplies it natively; on CUDA always, and the biased attention needs 16
@@ -109,8 +109,12 @@ std::vector<Held<ControlNet>> load_controlnets(const ModelParts& parts, nn::Plac
 
 }  // namespace
 
+bool has_cuda() {
+  return at::hasCUDA();
+}
+
 void check_device(Device device, Dtype dtype) {
-  if (device == Device::kCuda && !at::hasCUDA())
+  if (device == Device::kCuda && !has_cuda())
     throw Error(
         ErrorCode::kDevice, "device",
         "is cuda, but there is no CUDA device here, or this patina was built without CUDA (docs/models.md)");

@@ -10,6 +10,9 @@
 
 namespace patina::diffusion {
 
+/// Whether this patina was built with CUDA and finds a device.
+bool has_cuda();
+
 /// Throws Error if there is no such device here, or it does not compute in this precision.
 void check_device(Device device, Dtype dtype);
 
