@@ -20,9 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the usual run of patina-mini takes at most: nine views of 256², textures of 1024² (docs/packaging.md).
-constexpr double kUsualMemory = 2e9;   // bytes
-constexpr double kUsualSpace = 0.2e9;  // bytes of a run folder
+// The fit of the demo, nine views of 256² with patina-mini, peaks at 0.96 GB; larger textures take more.
+constexpr double kUsualMemory = 1.2e9;  // bytes
+constexpr double kUsualSpace = 0.1e9;   // bytes
 
 // Facts are printed as they are found; problems are kept for the end.
 class Examination {
@@ -71,10 +71,11 @@ void examine_memory(Examination& examination) {
   const std::string text =
       fmt::format("{} available of {}", gigabytes(available), gigabytes(static_cast<double>(total_bytes())));
   if (available > 0 && available < kUsualMemory)
-    examination.problem("memory", text,
-                        fmt::format("The usual run takes up to {}: close other programs, or use --low-memory "
-                                    "and fewer views (--views 4)",
-                                    gigabytes(kUsualMemory)));
+    examination.problem(
+        "memory", text,
+        fmt::format("A run with patina-mini takes about {}: close other programs, or use --low-memory "
+                    "and fewer views (--views 4)",
+                    gigabytes(kUsualMemory)));
   else
     examination.fact("memory", text);
 }
