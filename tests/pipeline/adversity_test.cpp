@@ -1,6 +1,7 @@
 // What a user meets when the world is not as it should be: link loops, dark environments, faces that point
 // inwards, prompts of unknown words, files that become shorter while they are mapped, narrow terminals.
 #include <signal.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -187,6 +188,39 @@ TEST(Adversity, a_thread_that_cannot_be_started_is_told_also_from_other_librarie
         std::thread([&]() noexcept { refuse(); }).join();
       },
       testing::ExitedWithCode(1), "patina: the system refuses a thread.*ulimit");
+}
+
+TEST(Adversity, a_limit_of_memory_that_networks_do_not_fit_in_is_told_before_anything_is_rendered) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_AS, &before), 0);
+  const rlimit low{1900ull << 20, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_AS, &low), 0);
+  const ProcessResult result =
+      patina({"enhance", "none.glb", "-p", "rust", "-m", (data_dir() / "tiny-sd").string(), "-o", "o.glb"});
+  ASSERT_EQ(::setrlimit(RLIMIT_AS, &before), 0);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.error.find("may use 1900 MB of addresses (ulimit -v)"), std::string::npos) << result.error;
+}
+
+// The cases/sd of tests/data, as its README says. What is missing is told once the model is accepted.
+TEST(Adversity, models_of_the_cases_are_taken_or_refused_before_the_asset_is_read) {
+  const TemporaryFolder folder;
+  const fs::path sd = data_dir() / "cases/sd", mini = app::bundled_model(), model = folder.path() / "model";
+  fs::copy(data_dir() / "tiny-sd", model, fs::copy_options::recursive);
+  fs::copy_file(sd / "scheduler_order_3.json", model / "scheduler/scheduler_config.json",
+                fs::copy_options::overwrite_existing);
+  const auto said = [](const fs::path& used, std::vector<std::string> more) {
+    more.insert(more.begin(), {"enhance", "none.glb", "-p", "rust", "-o", "x.glb", "-m", used.string()});
+    return patina(more).error;
+  };
+  const std::string missing = "patina: none.glb: no such file";
+  for (const char* lora : {"lora_diffusion_model_names", "lora_with_embedding"})
+    EXPECT_NE(said(mini, {"--lora", (sd / lora).string() + ".safetensors:0.8"}).find(missing),
+              std::string::npos)
+        << lora;
+  EXPECT_NE(said(mini, {"--lora", (sd / "lora_fp8.safetensors").string() + ":0.8"}).find("holds F8_E4M3"),
+            std::string::npos);
+  EXPECT_NE(said(model, {"--scheduler", "ddim"}).find(missing), std::string::npos);
 }
 
 TEST(Adversity, a_stop_is_heard_at_once) {

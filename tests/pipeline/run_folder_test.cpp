@@ -252,6 +252,24 @@ TEST(RunFolder, a_stage_that_was_killed_while_it_wrote_is_not_taken_for_the_one_
   EXPECT_FALSE(std::filesystem::exists(run.file("a.by-hand.txt")));
 }
 
+TEST(RunFolder, what_a_killed_process_wrote_half_is_removed) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "run";
+  {
+    RunFolder made(path);
+    CountingStage stage{made};
+    stage("key");
+  }
+  for (const char* name :
+       {".config.42.json", "views/.tile_00.4711.png", "views/.hidden.png", "views/a.1.png"})
+    write_file(path / name, std::string_view("half"));
+  const RunFolder run(path);
+  EXPECT_FALSE(std::filesystem::exists(run.file(".config.42.json")));
+  EXPECT_FALSE(std::filesystem::exists(run.file("views/.tile_00.4711.png")));
+  EXPECT_TRUE(std::filesystem::exists(run.file("views/.hidden.png")));
+  EXPECT_TRUE(std::filesystem::exists(run.file("views/a.1.png")));
+}
+
 TEST(RunFolder, a_stage_that_was_killed_before_it_wrote_leaves_the_one_before_it) {
   const test::TemporaryFolder folder;
   RunFolder run(folder.path() / "run");

@@ -6,14 +6,17 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 
 #include <fmt/format.h>
 
 #include "patina/base/error.h"
+#include "patina/base/half_written.h"
 #include "patina/base/mapped_files.h"
 
 namespace patina {
@@ -140,6 +143,36 @@ const char* mapped_file_at(const void* address) {
   return nullptr;
 }
 
+namespace {
+
+// A hidden name beside `path`, of this process, with the same extension.
+fs::path temporary_beside(const fs::path& path) {
+  return path.parent_path() /
+         fmt::format(".{}.{}{}", path.stem().string(), ::getpid(), path.extension().string());
+}
+
+bool is_temporary(const fs::path& path) {
+  const std::string name = path.filename().string();
+  // ".stem.1234.extension", or ".stem.1234" where the file has none.
+  const std::string number = path.stem().extension().string();
+  const auto is_number = [](const std::string& text) {
+    return text.size() > 1 &&
+           std::all_of(text.begin() + 1, text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+  };
+  return name.starts_with('.') && (is_number(number) || is_number(path.extension().string()));
+}
+
+}  // namespace
+
+void remove_half_written(const fs::path& folder) {
+  std::error_code failure;
+  std::vector<fs::path> found;
+  for (auto at = fs::recursive_directory_iterator(folder, failure);
+       !failure && at != fs::recursive_directory_iterator(); at.increment(failure))
+    if (at->is_regular_file(failure) && is_temporary(at->path())) found.push_back(at->path());
+  for (const fs::path& path : found) fs::remove(path, failure);
+}
+
 void write_file_with(const fs::path& path, const std::function<void(const fs::path&)>& write) {
   std::error_code failure;
   if (path.has_parent_path()) {
@@ -147,8 +180,7 @@ void write_file_with(const fs::path& path, const std::function<void(const fs::pa
     if (failure)
       throw Error(ErrorCode::kIo, path.parent_path().string(), "cannot be made: " + failure.message());
   }
-  fs::path temporary = path.parent_path() /
-                       fmt::format(".{}.{}{}", path.stem().string(), ::getpid(), path.extension().string());
+  const fs::path temporary = temporary_beside(path);
   try {
     write(temporary);
     fs::rename(temporary, path);

@@ -1,5 +1,8 @@
 #include "patina/pipeline/resolved_model.h"
 
+#include <sys/resource.h>
+
+#include <cstdint>
 #include <optional>
 
 #include <fmt/format.h>
@@ -24,6 +27,20 @@ std::string hash_of_files(const std::vector<fs::path>& files) {
   return hash_text(text);
 }
 
+// OpenBLAS, under LibTorch, waits for ever for a buffer that it cannot have, so a limit that is too low must
+// be told before. With 1.2 to 1.5 GB runs of the smallest model failed or hung, with 1.6 GB they ended.
+void require_address_space() {
+  constexpr uint64_t kLeast = 2000ull << 20;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= kLeast)
+    return;
+  throw Error(
+      ErrorCode::kDevice, "memory",
+      fmt::format("this process may use {} MB of addresses (ulimit -v); the networks need at least {}, "
+                  "larger views more. Raise the limit",
+                  limit.rlim_cur >> 20, kLeast >> 20));
+}
+
 diffusion::ModelParts find_parts(const EditSettings& settings) {
   if (settings.model.model.empty())
     throw Error(
@@ -31,6 +48,7 @@ diffusion::ModelParts find_parts(const EditSettings& settings) {
         "give a diffusion model: a diffusers folder or a .safetensors checkpoint of Stable Diffusion 1.x or "
         "2.x; `patina models DIR` lists those in a folder");
   diffusion::check_device(settings.device, settings.dtype);
+  require_address_space();
   diffusion::ModelParts parts = diffusion::find_model_parts(settings.model);
   diffusion::check_model(parts, settings.options.scheduler);
   return parts;

@@ -16,6 +16,7 @@
 #include "patina/asset/json_view.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
+#include "patina/base/half_written.h"
 #include "patina/base/memory.h"
 
 namespace patina::pipeline {
@@ -101,6 +102,7 @@ RunFolder::RunFolder(const fs::path& path) : path_(path) {
   lock_.emplace(path_);
   const fs::path record = path_ / "stages.json";
   if (!fs::exists(record)) return;
+  remove_half_written(path_);  // never in a folder of something else
   const auto refuse = [&](const std::string& fault) {
     throw Error(ErrorCode::kFormat, record.string(),
                 fmt::format("is not a record of stages ({}); remove it to run all stages again", fault));
