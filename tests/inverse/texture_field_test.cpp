@@ -25,6 +25,8 @@ TEST(texture_field, restriction_is_the_adjoint_of_composition) {
       for (size_t k = 0; k < shares.size(); ++k) shares[k] = {static_cast<uint16_t>(3 * k), random.uniform()};
     for (Image& level : field.levels)
       for (float& value : level.pixels) value = random.uniform() - 0.5f;
+    field.edited = Image(37, 20, 1);
+    for (float& value : field.edited.pixels) value = random.uniform();
     inverse::compose(field);
     Image y(37, 20, 2);
     for (float& value : y.pixels) value = random.uniform() - 0.5f;

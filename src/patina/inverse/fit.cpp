@@ -6,6 +6,7 @@
 #include "patina/base/check.h"
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
+#include "patina/inverse/edited_pixels.h"
 #include "patina/inverse/fit_result.h"
 #include "patina/inverse/fit_setup.h"
 #include "patina/inverse/fit_slots.h"
@@ -101,11 +102,16 @@ void Fit::trace(int generation) {
 // off the cache is, and beside the edited ones, which texels are of one kind.
 void Fit::learn_from_start() {
   const std::vector<vec3> clean = evaluator_.shade_samples(cache_);
-  if (!inputs_.clean.empty()) calibrate(cache_, clean, inputs_.clean, gain_);
+  std::vector<float> edited(cache_.pixels.size(), 1.0f);
+  if (!inputs_.clean.empty()) {
+    edited = edited_pixels(cache_, inputs_.views, inputs_.clean);
+    calibrate(cache_, clean, inputs_.clean, gain_);
+  }
   for (size_t f = 0; f < state_.fitted.size(); ++f) {
     FittedMap& map = state_.fitted[f];
-    if (!fit_slot(map.slot).follows_kinds) continue;
     const SampleTaps& taps = evaluator_.taps_of(f);
+    map.field.edited = edited_texels(cache_, edited, taps, map.evidence.width, map.evidence.height);
+    if (!fit_slot(map.slot).follows_kinds) continue;
     map.field.kinds = MaterialKinds(cache_, clean, gain_, taps.samples).shares(taps);
   }
 }

@@ -7,6 +7,7 @@
 #include "patina/base/parallel.h"
 #include "patina/image/color.h"
 #include "patina/inverse/alignment.h"
+#include "patina/inverse/edited_pixels.h"
 #include "patina/inverse/loss.h"
 
 namespace patina::inverse {
@@ -21,12 +22,6 @@ constexpr float kMaxCalibration = 1.5f;
 // Relative change of a pixel up to which the light cache is still off as it was before, and from which on its
 // error at the start says nothing any more.
 constexpr float kLeastEdit = 0.03f, kFullEdit = 0.1f;
-
-// Relative change from a clean to an edited pixel.
-float edit_of(const vec3& clean, const vec3& edited) {
-  constexpr float kDark = 0.05f;
-  return max_component(glm::abs(edited - clean) / (glm::max(edited, clean) + kDark));
-}
 
 }  // namespace
 

@@ -93,6 +93,17 @@ void add_restricted(const asset::Map& map, const Image& fine, Image& coarse) {
   });
 }
 
+// What was not edited does not change.
+void take_edited_share(const TextureField& field, Image& change) {
+  const auto channels = static_cast<size_t>(change.channels);
+  parallel_for(0, static_cast<int64_t>(field.edited.pixels.size()), kTexelsPerTask,
+               [&](int64_t begin, int64_t end) {
+                 for (auto t = static_cast<size_t>(begin); t < static_cast<size_t>(end); ++t)
+                   for (size_t c = 0; c < channels; ++c)
+                     change.pixels[t * channels + c] *= field.edited.pixels[t];
+               });
+}
+
 }  // namespace
 
 TextureField make_field(const asset::Map& map, int width, int height, int channels) {
@@ -128,6 +139,7 @@ Image composed(const TextureField& field, std::span<const Image> levels) {
                      for (size_t c = 0; c < channels; ++c)
                        sum.pixels[t * channels + c] += share * of_kinds.pixels[kind * channels + c];
                });
+  take_edited_share(field, sum);
   return sum;
 }
 
@@ -137,6 +149,7 @@ void compose(TextureField& field) {
 
 std::vector<Image> restrict_to_levels(const TextureField& field, Image d_delta) {
   const int num_channels = d_delta.channels;
+  take_edited_share(field, d_delta);
   std::vector<Image> gradients;
   gradients.push_back(std::move(d_delta));
   for (size_t level = 1; level + 1 < field.levels.size(); ++level) {

@@ -37,9 +37,10 @@ struct KindShares {
 struct TextureField {
   asset::Map delta;  // [h,w,C] composed change; the map's UV set, transform and wrap modes
   // Finest (size of delta) first, the last holds the values of the kinds [1,kNumKinds,C]; delta = the sum of
-  // all, upsampled, and of each texel's kinds.
+  // all, upsampled, and of each texel's kinds, times `edited`.
   std::vector<Image> levels;
   KindShares kinds;
+  Image edited;  // [h,w,1] share of the change that a texel takes, 0 where nothing was edited; empty: all
 };
 
 /// A zero field of width × height texels for `map`, with levels down to about eight texels a side.
