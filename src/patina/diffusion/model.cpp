@@ -131,11 +131,11 @@ Model::Model(const ModelParts& parts, const ModelOptions& options) {
   const nn::Placement placement{scalar_type(dtype), device == Device::kCuda ? c10::kCUDA : c10::kCPU,
                                 options.low_memory};
   const bool resident = !options.low_memory;
-  state_ = std::unique_ptr<State>(new State{dtype, device, load_texts(parts, placement, resident),
-                                            load_network<UNet>(parts.unet, placement, &parts.loras.unet),
-                                            hold_network<Vae>(parts.vae, placement, resident),
-                                            load_controlnets(parts, placement, resident), parts.scheduler,
-                                            parts.guidance, parts.notes});
+  state_ = std::make_unique<State>(State{dtype, device, load_texts(parts, placement, resident),
+                                         load_network<UNet>(parts.unet, placement, &parts.loras.unet),
+                                         hold_network<Vae>(parts.vae, placement, resident),
+                                         load_controlnets(parts, placement, resident), parts.scheduler,
+                                         parts.guidance, parts.notes});
   check_fit(*state_);
   if (parts.ask_prediction) {
     state_->scheduler.prediction = ask_prediction(state_->unet, state_->scheduler);
