@@ -42,11 +42,11 @@ void add_upsampled(const asset::Map& map, const Image& coarse, Image& fine) {
       const UpsampleTap& ty = taps.y[static_cast<size_t>(y)];
       const float *row_a = coarse.at(0, ty.a), *row_b = coarse.at(0, ty.b);
       for (size_t i = 0; i < row.size(); ++i) row[i] = row_a[i] + ty.weight_b * (row_b[i] - row_a[i]);
+      const float* in = row.data();
       float* out = fine.at(0, y);
       for (const UpsampleTap& tx : taps.x)
         for (int c = 0; c < channels; ++c) {
-          const float a = row[static_cast<size_t>(tx.a * channels + c)],
-                      b = row[static_cast<size_t>(tx.b * channels + c)];
+          const float a = in[tx.a * channels + c], b = in[tx.b * channels + c];
           *out++ += a + tx.weight_b * (b - a);
         }
     }
