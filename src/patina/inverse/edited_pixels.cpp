@@ -9,10 +9,11 @@
 namespace patina::inverse {
 namespace {
 
-// Change up to which a surface was not edited, and from which on it was.
+// Change of a surface up to which it was not edited, and from which on it was. A mean over many pixels: the
+// noise of a single one, which calibrate() judges, is larger.
 constexpr float kNoEdit = 0.007f, kFullEdit = 0.02f;
-// The surface around a pixel: half a window's side, as a share of the view's.
-constexpr int kWindowsPerSide = 64;
+// The window around a pixel reaches the side of a view divided by this, each way.
+constexpr int kReachesPerSide = 64;
 
 }  // namespace
 
@@ -39,7 +40,7 @@ std::vector<float> edited_pixels(const LightCache& cache, const views::ViewSet& 
       const Image& change = changes[pixel.view];
       const std::vector<int32_t>& material = views.views[pixel.view].gbuffer.material;
       const auto at = [&](int x, int y) { return static_cast<size_t>(y) * change.width + x; };
-      const int reach = std::max(1, change.width / kWindowsPerSide);
+      const int reach = std::max(1, change.width / kReachesPerSide);
       float squared = 0, count = 0;
       for (int y = std::max(0, pixel.y - reach); y <= std::min(change.height - 1, pixel.y + reach); ++y)
         for (int x = std::max(0, pixel.x - reach); x <= std::min(change.width - 1, pixel.x + reach); ++x) {

@@ -15,7 +15,8 @@ float edit_of(const vec3& clean, const vec3& edited);
 
 /// Whether the surface around each pixel of `cache` was edited, [pixels] from 0 (no) to 1: by the root mean
 /// square of the pixels' changes, so that relief, which brightens and darkens in turn, counts where its
-/// brightness crosses the old one. `clean`: the views before they were edited, sRGB [H,W,3].
+/// brightness crosses the old one. `views`: whose pixels they are; only those of the same material count as
+/// around. `clean`: the views before they were edited, sRGB [H,W,3].
 std::vector<float> edited_pixels(const LightCache& cache, const views::ViewSet& views,
                                  std::span<const Image> clean);
 
