@@ -14,6 +14,7 @@
 #include "patina/image/color.h"
 #include "patina/inverse/edited_pixels.h"
 #include "patina/inverse/fit.h"
+#include "patina/inverse/fit_views.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/unseen.h"
 #include "recovery/recovery.h"
@@ -303,6 +304,32 @@ TEST(fit, a_view_that_was_not_edited_changes_nothing) {
   const float with_clean = largest_change(task.edited), without = largest_change({});
   EXPECT_LT(with_clean, 1e-6f);  // normals are scaled to length one
   EXPECT_GT(without, 0.08f);     // which the errors of the light cache would do
+}
+
+TEST(fit, counts_pixels_less_that_the_light_cache_shows_wrongly) {
+  Task task = make_task();
+  const Image& edited = task.edited[0];
+  inverse::LightCache cache;
+  cache.pixels = inverse::select_pixels(task.views, {{inverse::loss_target(edited)}},
+                                        {{Image(edited.width, edited.height, 1, 1.0f)}});
+  // One sample a pixel: right, a twentieth off, far off, and so on.
+  constexpr float kErrors[] = {0.0f, 0.05f, 0.5f}, kWeights[] = {1.0f, 0.5f, 0.0f};
+  std::vector<vec3> of_samples;
+  cache.first_sample.push_back(0);
+  for (size_t i = 0; i < cache.pixels.size(); ++i) {
+    const vec3 wrong = cache.pixels[i].target * (1.0f - kErrors[i % 3]);
+    of_samples.push_back(wrong / (1.0f - wrong));
+    cache.samples.emplace_back().pixel = static_cast<uint32_t>(i);
+    cache.first_sample.push_back(static_cast<uint32_t>(i + 1));
+  }
+  inverse::calibrate(cache, of_samples, task.edited, 1.0f);
+  int num_lit = 0;
+  for (size_t i = 0; i < cache.pixels.size(); ++i) {
+    if (max_component(cache.pixels[i].target) < 0.2f) continue;  // of dark pixels, errors count less
+    EXPECT_NEAR(cache.pixels[i].weight, kWeights[i % 3], 0.15f);
+    ++num_lit;
+  }
+  EXPECT_GT(num_lit, 100);
 }
 
 TEST(fit, knows_which_half_of_a_view_was_edited) {

@@ -22,6 +22,8 @@ constexpr float kMaxCalibration = 1.5f;
 // Relative change of a pixel up to which the light cache is still off as it was before, and from which on its
 // error at the start says nothing any more.
 constexpr float kLeastEdit = 0.03f, kFullEdit = 0.1f;
+// A pixel of which the light cache is that far off at the start counts half (decision 0024).
+constexpr float kHalfTrusted = 0.05f;
 
 }  // namespace
 
@@ -48,6 +50,8 @@ void calibrate(LightCache& cache, std::span<const vec3> of_samples, std::span<co
     for (size_t s = cache.first_sample[i]; s < cache.first_sample[i + 1]; ++s)
       shown += cache.samples[s].share * of_samples[s];
     const vec3 mapped = targets[pixel.view].rgb(pixel.x, pixel.y);
+    const float error = edit_of(mapped, gain * shown / (1.0f + gain * shown));
+    pixel.weight /= 1.0f + square(error / kHalfTrusted);
     const float unedited = 1.0f - glm::smoothstep(kLeastEdit, kFullEdit, edit_of(mapped, pixel.target));
     for (int c = 0; c < 3; ++c) {
       if (mapped[c] >= kClippedTarget) continue;  // anything that bright

@@ -15,7 +15,8 @@ std::vector<Image> rendered_views(std::span<const vec3> radiance, std::span<cons
 
 /// Gives the pixels of `cache` factors with which it shows the `clean` views, sRGB [H,W,3], where its samples
 /// have the radiance `of_samples`: what it does wrong at the start it then does wrong alike afterwards, and a
-/// view that was not edited changes nothing.
+/// view that was not edited changes nothing. Takes weight from pixels that it shows wrongly: what an edit
+/// makes of them tells little.
 void calibrate(LightCache& cache, std::span<const vec3> of_samples, std::span<const Image> clean, float gain);
 
 /// Whether the views are moved before `iteration`.
