@@ -37,6 +37,8 @@ pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO) # its CMake package
 pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebp libwebpmux)
 pkg_check_modules(UTF8PROC REQUIRED IMPORTED_TARGET libutf8proc)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+pkg_check_modules(DRACO REQUIRED IMPORTED_TARGET draco)
+find_package(meshoptimizer REQUIRED)
 if(PATINA_BUILD_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)

@@ -134,7 +134,7 @@ void container(std::span<const uint8_t> bytes) {
   const auto opened = asset::open_gltf(scratch_folder() / "x.glb", copy_of(bytes));
   const asset::SourceDocument& document = *opened.document;
   for (const auto& view : document.views)
-    require(view.size() <= bytes.size() + (1 << 20), "views are inside");
+    require(view.size() <= 64 * bytes.size() + (1 << 20), "views are inside, or decompressed from what is");
   const auto images = document.root().find("images");
   for (size_t i = 0; images && i < images->size(); ++i) asset::encoded_image(document, i);
 }
@@ -162,6 +162,43 @@ void accessor(std::span<const uint8_t> all) {
   const size_t expected = info.count * static_cast<size_t>(info.num_components);
   require(asset::read_floats(*opened.document, info).size() == expected, "all elements as floats");
   require(asset::read_integers(*opened.document, info).size() == expected, "all elements as integers");
+}
+
+// The bytes are the Draco data of a primitive with positions and texture coordinates.
+void draco(std::span<const uint8_t> bytes) {
+  if (bytes.empty()) return;
+  const json primitive{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}},
+                       {"extensions",
+                        {{"KHR_draco_mesh_compression",
+                          {{"bufferView", 0}, {"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}}}}}};
+  const json gltf{{"asset", {{"version", "2.0"}}},
+                  {"nodes", {{{"mesh", 0}}}},
+                  {"meshes", {{{"primitives", {primitive}}}}},
+                  {"accessors",
+                   {{{"componentType", 5126}, {"count", 1}, {"type", "VEC3"}},
+                    {{"componentType", 5126}, {"count", 1}, {"type", "VEC2"}}}},
+                  {"buffers", {{{"byteLength", bytes.size()}}}},
+                  {"bufferViews", {{{"buffer", 0}, {"byteLength", bytes.size()}}}}};
+  use(asset::read_asset("x.glb", asset::glb_bytes(gltf.dump(), bytes, "x.glb")));
+}
+
+// The first bytes are what the extension says of the others.
+void meshopt(std::span<const uint8_t> all) {
+  constexpr std::array kModes{"ATTRIBUTES", "TRIANGLES", "INDICES"};
+  constexpr std::array kFilters{"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"};
+  Bytes bytes(all);
+  const uint32_t count = bytes.number16(), stride = bytes.byte();
+  const std::string mode = bytes.one_of(kModes), filter = bytes.one_of(kFilters);
+  if (bytes.is_empty()) return;
+  const json how{{"buffer", 0},    {"byteLength", bytes.rest().size()},
+                 {"count", count}, {"byteStride", stride},
+                 {"mode", mode},   {"filter", filter}};
+  const json gltf{{"asset", {{"version", "2.0"}}},
+                  {"buffers", {{{"byteLength", bytes.rest().size()}}, {{"byteLength", 1}}}},
+                  {"bufferViews",
+                   {{{"buffer", 1}, {"byteLength", 1}, {"extensions", {{"EXT_meshopt_compression", how}}}}}}};
+  const auto opened = asset::open_gltf("x.glb", asset::glb_bytes(gltf.dump(), bytes.rest(), "x.glb"));
+  require(opened.document->views[0].size() == size_t{count} * stride, "as many elements as the count says");
 }
 
 void obj(std::span<const uint8_t> bytes) {

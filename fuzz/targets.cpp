@@ -17,10 +17,18 @@ namespace fs = std::filesystem;
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> table{
-      {"glb", container, {"tests/data/bad-inputs/glb", "tests/data/cases/gltf", "bad-inputs/glb"}, ".glb"},
+      {"glb",
+       container,
+       {"tests/data/bad-inputs/glb", "tests/data/cases/gltf", "fuzz/seeds/compressed", "bad-inputs/glb"},
+       ".glb"},
       {"gltf", scene, {"tests/data/bad-inputs/gltf", "tests/data/cases/gltf", "bad-inputs/gltf"}, ".gltf"},
       {"accessor", accessor, {"fuzz/seeds/accessor"}, ""},
-      {"export", round_trip, {"tests/data/bad-inputs/glb", "tests/data/cases/gltf"}, ".glb"},
+      {"draco", draco, {"fuzz/seeds/draco"}, ""},
+      {"meshopt", meshopt, {"fuzz/seeds/meshopt"}, ""},
+      {"export",
+       round_trip,
+       {"tests/data/bad-inputs/glb", "tests/data/cases/gltf", "fuzz/seeds/compressed"},
+       ".glb"},
       {"json-patch", json_patch, {"fuzz/seeds/json-patch"}, ""},
       {"obj", obj, {"tests/data/bad-inputs/obj", "tests/data/cases/obj", "bad-inputs/obj"}, ".obj"},
       {"mtl", mtl, {"tests/data/bad-inputs/obj", "tests/data/cases/obj", "bad-inputs/obj"}, ".mtl"},

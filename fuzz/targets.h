@@ -46,6 +46,8 @@ void require(bool holds, const char* promise);
 void container(std::span<const uint8_t> bytes);
 void scene(std::span<const uint8_t> bytes);
 void accessor(std::span<const uint8_t> bytes);
+void draco(std::span<const uint8_t> bytes);
+void meshopt(std::span<const uint8_t> bytes);
 void obj(std::span<const uint8_t> bytes);
 void mtl(std::span<const uint8_t> bytes);
 void json_patch(std::span<const uint8_t> bytes);

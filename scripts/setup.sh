@@ -14,6 +14,7 @@ packages=(
   libtorch-dev libopenblas0-pthread   # networks; without OpenBLAS matrix products fall to 5 GFLOP/s
   libembree-dev libtbb-dev            # ray casting, threads
   libopenimageio-dev libwebp-dev zlib1g-dev   # image files, animated turntables, PNG checksums
+  libdraco-dev libmeshoptimizer-dev   # compressed glTF
   libutf8proc-dev                     # characters of prompts: classes, lower case, composition
   nlohmann-json3-dev libglm-dev libcli11-dev libfmt-dev libxxhash-dev
   libgtest-dev libbenchmark-dev

@@ -2,6 +2,7 @@
 // and what export can refuse, refused before there is anything to write.
 #include <gtest/gtest.h>
 
+#include "compressed_gltf.h"
 #include "patina/asset/export.h"
 #include "patina/asset/material_maps.h"
 #include "patina/base/error.h"
@@ -274,16 +275,24 @@ TEST(Export, indices_inside_compression_extensions_follow_their_buffers) {
   const TemporaryFolder folder;
   TinyGltf g = TinyGltf::quad();
   const fs::path path = g.write_gltf(folder.path());
-  // A second buffer with compressed bytes, and a third that only decompression could fill.
-  const std::vector<uint8_t> packed{1, 2, 3, 4, 5, 6, 7};
+  // A second buffer with compressed bytes from its third on, and one that only decompression could fill.
+  std::vector<uint8_t> packed = test::meshopt_sequence({0, 1, 2, 3});
+  const size_t length = packed.size();
+  packed.insert(packed.begin(), {1, 2});
   write_file(folder.path() / "packed.bin", std::span<const uint8_t>(packed));
-  g.json["buffers"].push_back({{"byteLength", 7}, {"uri", "packed.bin"}});
+  g.json["buffers"].push_back({{"byteLength", packed.size()}, {"uri", "packed.bin"}});
   g.json["buffers"].push_back(
       {{"byteLength", 64}, {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
-  g.json["bufferViews"].push_back(
-      {{"buffer", 2},
-       {"byteLength", 64},
-       {"extensions", {{"EXT_meshopt_compression", {{"buffer", 1}, {"byteOffset", 2}, {"byteLength", 4}}}}}});
+  g.json["bufferViews"].push_back({{"buffer", 2},
+                                   {"byteLength", 8},
+                                   {"extensions",
+                                    {{"EXT_meshopt_compression",
+                                      {{"buffer", 1},
+                                       {"byteOffset", 2},
+                                       {"byteLength", length},
+                                       {"byteStride", 2},
+                                       {"count", 4},
+                                       {"mode", "INDICES"}}}}}});
   g.json["extensionsUsed"] = {"EXT_meshopt_compression"};
   write_file(path, g.json.dump());
   const Asset asset = read_asset(path);
@@ -295,10 +304,10 @@ TEST(Export, indices_inside_compression_extensions_follow_their_buffers) {
   EXPECT_EQ(view["buffer"], 1);
   const json& compressed = view["extensions"]["EXT_meshopt_compression"];
   EXPECT_EQ(compressed["buffer"], 0);
-  EXPECT_EQ(compressed["byteLength"], 4);
+  EXPECT_EQ(compressed["byteLength"], length);
   const auto bytes = read_file(folder.path() / "out.glb");
   const size_t bin = 12 + 8 + (bytes[12] | size_t{bytes[13]} << 8) + 8;
-  EXPECT_EQ(bytes[bin + compressed["byteOffset"].get<size_t>()], 3);
+  EXPECT_EQ(bytes[bin + compressed["byteOffset"].get<size_t>()], packed[2]);
   EXPECT_EQ(read_asset(folder.path() / "out.glb").primitives.size(), 1u);
 }
 

@@ -116,17 +116,6 @@ INSTANTIATE_TEST_SUITE_P(
                     Figures{"Cameras/Cameras.gltf", 2, 1, -1, -1, -1},
                     Figures{"AnimatedMorphCube-Quantized/AnimatedMorphCube.gltf", 12, 1, -1, -1, -1}));
 
-TEST(SharedAssets, draco_is_refused_by_name) {
-  PATINA_REQUIRE_SHARED("assets/Box-Draco/Box.gltf");
-  try {
-    read_asset(test::shared_dir() / "assets/Box-Draco/Box.gltf");
-    FAIL() << "was read";
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kUnsupported);
-    EXPECT_NE(e.message().find("KHR_draco_mesh_compression"), std::string::npos);
-  }
-}
-
 TEST(SharedAssets, meshes_without_uvs_are_told_how_to_get_them) {
   PATINA_REQUIRE_SHARED("assets/BoxInterleaved/BoxInterleaved.glb");
   const Asset asset = read_asset(test::shared_dir() / "assets/BoxInterleaved/BoxInterleaved.glb");

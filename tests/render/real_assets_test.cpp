@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "../support.h"
+#include "compressed_gltf.h"
 #include "patina/render/path_tracer.h"
 
 namespace patina::render {
@@ -37,6 +38,35 @@ TEST(real_assets, render_finite_and_plausible) {
       EXPECT_GT(sum / covered, 0.02) << name;
       EXPECT_LT(sum / covered, 5.0) << name;
     }
+  }
+}
+
+Image picture_of(const asset::Asset& asset) {
+  const Scene scene(asset, asset::resolve_materials(asset), studio_environment());
+  const asset::Bounds bounds = asset::bounds(asset);
+  const Camera camera =
+      look_at(bounds.center() + 3.0f * bounds.radius() * glm::normalize(vec3(0.5f, 0.4f, 1.0f)),
+              bounds.center(), 0.7f, 64, 64);
+  PathOptions options;
+  options.samples_per_pixel = 16;
+  return render(scene, camera, options).radiance;
+}
+
+float mean_difference(const Image& a, const Image& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i) sum += std::abs(double{a.pixels[i]} - b.pixels[i]);
+  return static_cast<float>(sum / static_cast<double>(a.pixels.size()));
+}
+
+TEST(real_assets, compressed_ones_look_as_they_did) {
+  const auto file = patina::test::data_dir().parent_path().parent_path() / "examples/kettle.glb";
+  const test::GlbParts plain = test::read_glb_parts(file);
+  const Image expected = picture_of(asset::read_asset(file));
+  const Image meshopt = picture_of(asset::read_asset("x.glb", glb_of(with_meshopt(plain))));
+  EXPECT_LT(mean_difference(meshopt, expected), 1e-5f);  // triangles begin with another corner
+  for (const bool in_order : {true, false}) {
+    const Image draco = picture_of(asset::read_asset("x.glb", glb_of(with_draco(plain, in_order))));
+    EXPECT_LT(mean_difference(draco, expected), 0.002f) << in_order;
   }
 }
 

@@ -8,21 +8,6 @@
 namespace patina::asset {
 namespace {
 
-size_t component_bytes(Component c) {
-  switch (c) {
-    case Component::kInt8:
-    case Component::kUint8:
-      return 1;
-    case Component::kInt16:
-    case Component::kUint16:
-      return 2;
-    case Component::kUint32:
-    case Component::kFloat:
-      return 4;
-  }
-  return 0;
-}
-
 Component component_of(const JsonView& json) {
   const int64_t value = json.integer(INT32_MIN, INT32_MAX);
   for (const auto c : {Component::kInt8, Component::kUint8, Component::kInt16, Component::kUint16,
@@ -99,16 +84,7 @@ Elements elements_of(const SourceDocument& d, const JsonView& json, size_t count
   const size_t index = reference.index(d.views.size(), "bufferView");
   const auto bytes = d.views[index];
   const JsonView view = d.root().at("bufferViews")[index];
-  if (bytes.empty()) {
-    if (const auto extensions = view.find("extensions"))
-      for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
-        if (extensions->find(name))
-          view.fail(
-              fmt::format("the data is compressed with {}, which patina does not read; export it without",
-                          name),
-              ErrorCode::kUnsupported);
-    view.fail("its buffer has no data");
-  }
+  if (bytes.empty()) view.fail("its buffer has no data");
   const auto offset_json = json.find("byteOffset");
   const auto offset = static_cast<uint64_t>(offset_json ? offset_json->integer(0, int64_t{1} << 40) : 0);
   size_t stride = element;
@@ -131,6 +107,11 @@ Elements elements_of(const SourceDocument& d, const JsonView& json, size_t count
 template <class Visit>
 void for_each_element(const SourceDocument& d, const AccessorInfo& info, Visit visit) {
   const size_t element = component_bytes(info.component) * static_cast<size_t>(info.num_components);
+  if (!info.decompressed.empty()) {
+    const Elements all{info.decompressed.data(), element};
+    for (size_t i = 0; i < info.count; ++i) visit(i, all.at(i));
+    return;
+  }
   if (info.json.find("bufferView")) {
     const Elements base = elements_of(d, info.json, info.count, element, true);
     for (size_t i = 0; i < info.count; ++i) visit(i, base.at(i));
@@ -161,6 +142,21 @@ void for_each_element(const SourceDocument& d, const AccessorInfo& info, Visit v
 }
 
 }  // namespace
+
+size_t component_bytes(Component c) {
+  switch (c) {
+    case Component::kInt8:
+    case Component::kUint8:
+      return 1;
+    case Component::kInt16:
+    case Component::kUint16:
+      return 2;
+    case Component::kUint32:
+    case Component::kFloat:
+      return 4;
+  }
+  return 0;
+}
 
 AccessorInfo accessor_info(const SourceDocument& d, const JsonView& reference, uint64_t max_count) {
   const auto accessors = d.root().find("accessors");

@@ -2,6 +2,7 @@
 // integers after all sizes are checked [glTF2, Sec. 3.6.2].
 #pragma once
 
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -20,6 +21,8 @@ enum class Component {
   kFloat = 5126
 };
 
+size_t component_bytes(Component component);
+
 /// What the description of an accessor says, without its data.
 struct AccessorInfo {
   JsonView json;
@@ -27,6 +30,7 @@ struct AccessorInfo {
   int num_components = 1;  // 1 to 4, or 16 for MAT4
   bool normalized = false;
   size_t count = 0;
+  std::span<const uint8_t> decompressed = {};  // packed elements that stand for the accessor's own data
 };
 
 /// `reference` is the JSON value that holds the accessor's index. `max_count` guards accessors that take no

@@ -11,6 +11,7 @@ using enum ExtensionUse;
 
 constexpr const char* kLook = "what it adds to the look is not rendered";
 constexpr const char* kNoLook = "changes nothing in a still picture";
+constexpr const char* kCompressed = "the mesh is decompressed for the views; its data stays as it was";
 
 constexpr std::array kTable = {
     ExtensionRow{"ADOBE_materials_clearcoat_specular", kNoted, kLook},
@@ -25,7 +26,7 @@ constexpr std::array kTable = {
     ExtensionRow{"EXT_mesh_features", kCarriedOver, kNoLook},
     ExtensionRow{"EXT_mesh_gpu_instancing", kObeyed, "every instance is in the views"},
     ExtensionRow{"EXT_mesh_manifold", kCarriedOver, kNoLook},
-    ExtensionRow{"EXT_meshopt_compression", kRefused, "export without compression"},
+    ExtensionRow{"EXT_meshopt_compression", kObeyed, kCompressed},
     ExtensionRow{"EXT_structural_metadata", kCarriedOver, kNoLook},
     ExtensionRow{"EXT_texture_avif", kNoted, "the PNG or JPEG beside it is read"},
     ExtensionRow{"EXT_texture_procedurals_mx_1_39", kNoted, "procedural textures are not read"},
@@ -37,7 +38,7 @@ constexpr std::array kTable = {
     ExtensionRow{"KHR_animation_pointer", kCarriedOver, "views show the asset at rest"},
     ExtensionRow{"KHR_audio_graph", kCarriedOver, kNoLook},
     ExtensionRow{"KHR_collision_shapes", kCarriedOver, kNoLook},
-    ExtensionRow{"KHR_draco_mesh_compression", kRefused, "export without compression"},
+    ExtensionRow{"KHR_draco_mesh_compression", kObeyed, kCompressed},
     ExtensionRow{"KHR_gaussian_splatting", kRefused, "splats have no surface to texture"},
     ExtensionRow{"KHR_interactivity", kCarriedOver, "views show the asset at rest"},
     ExtensionRow{"KHR_lights_punctual", kObeyed, "the lights light the views"},
@@ -57,7 +58,8 @@ constexpr std::array kTable = {
     ExtensionRow{"KHR_materials_variants", kCarriedOver, "the default variant is in the views"},
     ExtensionRow{"KHR_materials_volume", kNoted, kLook},
     ExtensionRow{"KHR_mesh_quantization", kObeyed, "small integers are read as the numbers they stand for"},
-    ExtensionRow{"KHR_meshopt_compression", kRefused, "export without compression"},
+    ExtensionRow{"KHR_meshopt_compression", kObeyed,
+                 "as EXT_meshopt_compression; version 1 of its codec and filtered colours are refused"},
     ExtensionRow{"KHR_node_hoverability", kCarriedOver, kNoLook},
     ExtensionRow{"KHR_node_selectability", kCarriedOver, kNoLook},
     ExtensionRow{"KHR_node_visibility", kObeyed, "hidden nodes and all below them are left out of the views"},

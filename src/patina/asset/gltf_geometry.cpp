@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "patina/asset/accessor.h"
+#include "patina/asset/draco_mesh.h"
 
 namespace patina::asset {
 namespace {
@@ -50,18 +51,35 @@ struct AttributeReader {
   const SourceDocument& d;
   JsonView attributes;
   uint64_t max_vertices;
-  size_t count = 0;  // of POSITION, once known
+  const DracoMesh* draco;  // where the primitive has one
+  size_t count = 0;        // of POSITION, once known
   bool quantized;
 
   AccessorInfo info(const JsonView& reference, std::string_view name,
                     std::initializer_list<int> components) const {
-    const AccessorInfo found = accessor_info(d, reference, max_vertices);
+    AccessorInfo found = accessor_info(d, reference, max_vertices);
+    if (draco) take_from_draco(found, std::string(name));
     if (std::find(components.begin(), components.end(), found.num_components) == components.end())
       found.json.at("type").fail(fmt::format("{} has elements of {} components, expected {}", name,
                                              found.num_components, *components.begin()));
     if (count && found.count != count)
       reference.fail(fmt::format("{} has {} elements, POSITION has {}", name, found.count, count));
     return found;
+  }
+
+  // What the Draco data holds stands for the accessor's own elements, however many it claims.
+  void take_from_draco(AccessorInfo& info, const std::string& name) const {
+    const auto found = draco->attributes.find(name);
+    if (found == draco->attributes.end()) return;
+    const DracoAttribute& attribute = found->second;
+    if (attribute.component != info.component || attribute.num_components != info.num_components)
+      info.json.fail(fmt::format(
+          "describes {} as {} components of type {}, but the Draco data has {} of type {}; export "
+          "the file again, or without Draco compression",
+          name, info.num_components, static_cast<int>(info.component), attribute.num_components,
+          static_cast<int>(attribute.component)));
+    info.count = draco->num_vertices;
+    info.decompressed = attribute.bytes;
   }
 
   template <class Vector>
@@ -122,6 +140,12 @@ std::vector<uvec3> assembled(const std::vector<uint32_t>& corners, int64_t mode)
   return triangles;
 }
 
+void check_corners(const std::vector<uint32_t>& corners, size_t num_vertices, const JsonView& where) {
+  for (size_t i = 0; i < corners.size(); ++i)
+    if (corners[i] >= num_vertices)
+      where.fail(fmt::format("index {} at place {} is past the {} vertices", corners[i], i, num_vertices));
+}
+
 std::vector<uint32_t> read_corners(const SourceDocument& d, const JsonView& primitive, size_t num_vertices,
                                    uint64_t max_vertices) {
   const auto reference = primitive.find("indices");
@@ -134,11 +158,23 @@ std::vector<uint32_t> read_corners(const SourceDocument& d, const JsonView& prim
   const AccessorInfo info = accessor_info(d, *reference, 3 * max_vertices);
   if (info.num_components != 1) info.json.at("type").fail("indices must be SCALAR");
   corners = read_integers(d, info);
-  for (size_t i = 0; i < corners.size(); ++i)
-    if (corners[i] >= num_vertices)
-      reference->fail(
-          fmt::format("index {} at place {} is past the {} vertices", corners[i], i, num_vertices));
+  check_corners(corners, num_vertices, *reference);
   return corners;
+}
+
+// The triangles of a primitive, however they are stored.
+std::vector<uvec3> read_triangles(const SourceDocument& d, const JsonView& primitive, int64_t mode,
+                                  const DracoMesh* draco, size_t num_vertices, uint64_t max_vertices,
+                                  std::vector<std::string>& warnings) {
+  if (draco) {  // always a list, also where the file asks that it be drawn as a strip
+    check_corners(draco->corners, num_vertices, primitive);
+    return assembled(draco->corners, 4);
+  }
+  const auto corners = read_corners(d, primitive, num_vertices, max_vertices);
+  if (mode == 4 && corners.size() % 3 != 0)
+    warnings.push_back(fmt::format("{}: {} corners are no whole number of triangles; the rest is left out",
+                                   primitive.where(), corners.size()));
+  return assembled(corners, mode);
 }
 
 void apply_morph_targets(const AttributeReader& reader, const JsonView& primitive,
@@ -184,15 +220,6 @@ void read_uvs(const AttributeReader& reader, Geometry& g) {
   }
 }
 
-void refuse_compressed(const JsonView& primitive) {
-  const auto extensions = primitive.find("extensions");
-  if (!extensions || !extensions->find("KHR_draco_mesh_compression")) return;
-  primitive.fail(
-      "its vertices exist only through the extension KHR_draco_mesh_compression, which patina does not read; "
-      "export without Draco compression",
-      ErrorCode::kUnsupported);
-}
-
 }  // namespace
 
 std::optional<LocalPrimitive> read_primitive(const SourceDocument& d, const JsonView& primitive,
@@ -205,14 +232,18 @@ std::optional<LocalPrimitive> read_primitive(const SourceDocument& d, const Json
     return std::nullopt;
   }
   const JsonView attributes = primitive.at("attributes");
-  AttributeReader reader{d, attributes, max_vertices, 0, uses_extension(d, "KHR_mesh_quantization")};
+  const std::optional<DracoMesh> draco = read_draco_mesh(d, primitive, max_vertices);
+  AttributeReader reader{d,
+                         attributes,
+                         max_vertices,
+                         draco ? &*draco : nullptr,
+                         draco ? draco->num_vertices : 0,
+                         uses_extension(d, "KHR_mesh_quantization")};
   const auto position = attributes.find("POSITION");
   if (!position) attributes.fail("a primitive needs POSITION");
   const AccessorInfo info = reader.info(*position, "POSITION", {3});
-  if (!info.json.find("bufferView") && !info.json.find("sparse")) {
-    refuse_compressed(primitive);
+  if (!info.json.find("bufferView") && !info.json.find("sparse") && info.decompressed.empty())
     position->fail("the accessor has no data");
-  }
 
   LocalPrimitive out;
   Geometry& g = out.geometry;
@@ -230,11 +261,7 @@ std::optional<LocalPrimitive> read_primitive(const SourceDocument& d, const Json
     for (size_t i = 0; i < reader.count; ++i)
       out.joints.emplace_back(values[4 * i], values[4 * i + 1], values[4 * i + 2], values[4 * i + 3]);
   }
-  const auto corners = read_corners(d, primitive, reader.count, max_vertices);
-  if (mode == 4 && corners.size() % 3 != 0)
-    warnings.push_back(fmt::format("{}: {} corners are no whole number of triangles; the rest is left out",
-                                   primitive.where(), corners.size()));
-  g.triangles = assembled(corners, mode);
+  g.triangles = read_triangles(d, primitive, mode, reader.draco, reader.count, max_vertices, warnings);
   if (g.triangles.size() > max_vertices)
     primitive.fail(fmt::format("{} triangles are more than a file of this size can hold", g.triangles.size()),
                    ErrorCode::kLimit);
@@ -242,6 +269,7 @@ std::optional<LocalPrimitive> read_primitive(const SourceDocument& d, const Json
     const auto materials = d.root().find("materials");
     out.material = static_cast<int>(material->index(materials ? materials->size() : 0, "material"));
   }
+  reader.draco = nullptr;  // it holds no morph targets
   apply_morph_targets(reader, primitive, weights, g);
   normalize_frames(g);
   return out;

@@ -37,7 +37,8 @@ struct SourceDocument {
   size_t bin_begin = 0, bin_end = 0;    // range of the GLB's BIN chunk data; empty where there is none
   nlohmann::json json;
   std::vector<SourceBuffer> buffers;
-  std::vector<std::span<const uint8_t>> views;  // bufferViews, checked against their buffers
+  std::vector<std::span<const uint8_t>> views;  // bufferViews, checked against their buffers; decompressed
+  std::vector<std::vector<uint8_t>> decompressed_views;  // what those of compressed views point to
 
   std::vector<std::string>
       references;  // decoded relative paths of all other files that the asset names, found or not
@@ -59,12 +60,14 @@ struct SourceDocument {
   JsonView root() const { return JsonView(json, name); }
 };
 
-/// What a small file may grow to in memory: flattened vertices (and triangles) of the whole asset, and bytes
-/// of decoded images. Both start generous and grow with the file, so that a few bytes of instancing or
-/// zero-filled accessors cannot exhaust memory.
+/// What a small file may grow to in memory: flattened vertices (and triangles) of the whole asset, bytes of
+/// decoded images, and bytes of decompressed buffer views or of one decompressed primitive. All start
+/// generous and grow with the file, so that a few bytes of instancing, zero-filled accessors or compressed
+/// data cannot exhaust memory.
 struct MemoryBudget {
   uint64_t vertices;
   uint64_t image_bytes;
+  uint64_t decompressed_bytes;
 };
 MemoryBudget memory_budget(uint64_t source_bytes);
 
