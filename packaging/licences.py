@@ -10,7 +10,7 @@ COMMON = Path("/usr/share/common-licenses")
 SOURCE = Path(__file__).resolve().parent.parent
 
 # Compiled into the program from headers alone.
-HEADER_PACKAGES = ("libcli11-dev", "libglm-dev", "nlohmann-json3-dev")
+HEADER_PACKAGES = ("libcli11-dev", "libglm-dev", "libtomlplusplus-dev", "nlohmann-json3-dev")
 
 
 def package_of(path):

@@ -16,7 +16,7 @@ packages=(
   libopenimageio-dev libwebp-dev zlib1g-dev   # image files, animated turntables, PNG checksums
   libdraco-dev libmeshoptimizer-dev   # compressed glTF
   libutf8proc-dev                     # characters of prompts: classes, lower case, composition
-  nlohmann-json3-dev libglm-dev libcli11-dev libfmt-dev libxxhash-dev
+  nlohmann-json3-dev libglm-dev libcli11-dev libtomlplusplus-dev libfmt-dev libxxhash-dev
   libgtest-dev libbenchmark-dev
 )
 if [[ "${1:-}" == "--ci" ]]; then packages+=(clang-format clang-tidy chromium); fi

@@ -7,6 +7,7 @@
 namespace patina::app {
 
 void add_enhance(CLI::App& program);
+void add_batch(CLI::App& program);
 void add_render(CLI::App& program);
 void add_detail(CLI::App& program);
 void add_fit(CLI::App& program);

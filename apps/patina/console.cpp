@@ -80,28 +80,6 @@ void write_event(const json& event) {
   write_error_stream(event.dump(-1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-const char* name_of(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kUsage:
-      return "usage";
-    case ErrorCode::kNotFound:
-      return "not found";
-    case ErrorCode::kFormat:
-      return "format";
-    case ErrorCode::kUnsupported:
-      return "unsupported";
-    case ErrorCode::kLimit:
-      return "limit";
-    case ErrorCode::kIo:
-      return "io";
-    case ErrorCode::kDevice:
-      return "device";
-    case ErrorCode::kInterrupted:
-      return "interrupted";
-  }
-  return "";
-}
-
 void install_signal_handlers() {
   std::signal(SIGINT, on_stop_signal);
   std::signal(SIGTERM, on_stop_signal);

@@ -58,9 +58,6 @@ class Console {
 /// One event of --progress json on standard error. Bytes that are not UTF-8 are replaced.
 void write_event(const nlohmann::json& event);
 
-/// "usage", "not found", ...: the kind of a failure in events.
-const char* name_of(ErrorCode code);
-
 /// Installs a handler for Ctrl-C and termination: the first asks the running stage to stop and keep what it
 /// has and says that it was heard, the second ends at once. And one for SIGBUS, which names the mapped file
 /// that became shorter.

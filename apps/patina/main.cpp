@@ -37,7 +37,8 @@ int main(int argc, char** argv) {
   open_standard_streams();
   // Only these commands run networks; the others start twice as fast without it.
   const std::string_view command = argc > 1 ? argv[1] : "";
-  if (command == "enhance" || command == "detail" || command == "ablate" || command == "show-attention")
+  if (command == "enhance" || command == "batch" || command == "detail" || command == "ablate" ||
+      command == "show-attention")
     patina::app::sleep_between_parallel_regions(argv);
   patina::app::install_signal_handlers();
   patina::app::say_why_when_terminated();

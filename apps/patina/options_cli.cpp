@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <sstream>
 
 #include <fmt/format.h>
 
 #include "bundled_model.h"
 #include "patina/base/error.h"
-#include "patina/base/files.h"
 #include "patina/base/text.h"
 #include "patina/pipeline/options.h"
+#include "toml_options.h"
 
 namespace patina::app {
 namespace {
@@ -46,54 +45,15 @@ void add_option(CLI::App& command, const pipeline::Option& option, GivenOptions&
   if (!option.is_list) item.cli->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
 
-// TOML with every list on one line and without the comments in it: CLI11 reads no others.
-std::string with_lists_on_one_line(const std::string& toml) {
-  std::string joined;
-  int depth = 0;
-  char quote = 0;
-  for (size_t i = 0; i < toml.size(); ++i) {
-    const char c = toml[i];
-    if (quote) {
-      if (c == quote && (quote == '\'' || toml[i - 1] != '\\')) quote = 0;
-    } else if (c == '#') {
-      while (i + 1 < toml.size() && toml[i + 1] != '\n') ++i;
-      continue;
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else if (c == '[' || c == ']') {
-      depth += c == '[' ? 1 : -1;
-    }
-    joined += depth > 0 && !quote && c == '\n' ? ' ' : c;
-  }
-  return joined;
-}
-
 // Options by name from a TOML file; options of other commands are left to them.
 void apply_file(const GivenOptions& given, pipeline::Config& config) {
-  std::istringstream text(with_lists_on_one_line(read_text_file(given.config_file, 1 << 20)));
-  std::vector<CLI::ConfigItem> items;
-  try {
-    items = CLI::ConfigTOML().from_config(text);
-  } catch (const CLI::Error& e) {
-    throw Error(ErrorCode::kUsage, given.config_file, fmt::format("is not valid TOML: {}", e.what()));
-  }
-  for (const CLI::ConfigItem& item : items) {
-    const pipeline::Option* option = pipeline::find_option(item.name);
-    if (!option || !item.parents.empty())
-      throw Error(
-          ErrorCode::kUsage, given.config_file,
-          fmt::format("unknown option '{}'; `patina enhance --help` lists them, without the dashes here",
-                      printable(item.fullname())));
-    if (item.inputs.empty())
-      throw Error(ErrorCode::kUsage, given.config_file, fmt::format("'{}' has no value", item.name));
-  }
+  const toml::table file = read_toml(given.config_file);
+  const std::vector<TomlOption> found = options_of(file, given.config_file, ErrorCode::kUsage);
   // In the order of the list, not of the file: a preset comes before what it would else overwrite.
   for (const GivenOptions::Item& own : given.items)
-    for (const CLI::ConfigItem& item : items)
-      if (item.name == own.name) {
-        const pipeline::Option& option = *pipeline::find_option(own.name);
-        option.set(config, pipeline::value_of_texts(option, item.inputs));
-      }
+    for (const TomlOption& one : found)
+      if (one.option->name == own.name)
+        one.option->set(config, pipeline::value_of_texts(*one.option, one.texts));
 }
 
 }  // namespace
@@ -112,11 +72,13 @@ std::shared_ptr<GivenOptions> add_options(CLI::App& command, const std::string& 
   for (const pipeline::Option& option : pipeline::options())
     if ((option.parts & parts) && std::find(without.begin(), without.end(), option.name) == without.end())
       add_option(command, option, *given);
-  command
-      .add_option("--config", given->config_file,
-                  "A TOML file with any of these options by name; the command line wins.")
-      ->type_name("FILE.toml")
-      ->group("Input and output");
+  const bool takes_config = std::find(without.begin(), without.end(), "config") == without.end();
+  if (takes_config)
+    command
+        .add_option("--config", given->config_file,
+                    "A TOML file with any of these options by name; the command line wins.")
+        ->type_name("FILE.toml")
+        ->group("Input and output");
   command
       .add_option("--progress", given->progress,
                   "How progress is told on standard error: plain for people, json for programs, one event a "

@@ -30,7 +30,7 @@ struct GivenOptions {
 };
 
 /// Adds the command's one positional argument ("ASSET", "RUN"), the options of `parts` (pipeline::Part) but
-/// for those named in `without`, and --config, --progress and --quiet.
+/// for those named in `without` (which may name "config" too), and --config, --progress and --quiet.
 std::shared_ptr<GivenOptions> add_options(CLI::App& command, const std::string& positional,
                                           const std::string& positional_help, unsigned parts,
                                           const std::vector<std::string>& without = {});

@@ -3,17 +3,15 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <filesystem>
-#include <new>
 #include <string>
 #include <string_view>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "commands.h"
 #include "console.h"
 #include "patina/base/error.h"
+#include "patina/base/failure.h"
 #include "usage.h"
 
 namespace patina::app {
@@ -45,35 +43,24 @@ bool asks_for_events(int argc, char** argv) {
   return false;
 }
 
-std::string refused_by_system(const std::system_error& e) {
-  return fmt::format("the system refuses a thread or a lock ({}); is a limit reached (ulimit -u, -v)? {}",
-                     e.code().message(), "Fewer threads need less (--threads 1)");
-}
-
 // Thread pools of other libraries start threads where no exception can be caught.
 [[noreturn]] void end_with_reason() {
-  try {
-    if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);
+  if (const std::exception_ptr thrown = std::current_exception()) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (...) {
+      const Failure failure = current_failure();
+      fail(1, failure.kind.c_str(), failure.about, failure.text, false);
+    }
+  } else {
     fail(1, "fault", "", "ended without a reason", false);
-  } catch (const std::system_error& e) {
-    fail(1, "device", "", refused_by_system(e), false);
-  } catch (const std::exception& e) {
-    fail(1, "fault", "", printable(e.what(), 2000), false);
-  } catch (...) {
-    fail(1, "fault", "", "an exception of no known type", false);
   }
   std::_Exit(1);
 }
 
-int exit_code_of(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kUsage:
-      return 2;
-    case ErrorCode::kInterrupted:
-      return 130;
-    default:
-      return 1;
-  }
+int exit_code_of(const std::string& kind) {
+  if (kind == name_of(ErrorCode::kUsage)) return 2;
+  return kind == name_of(ErrorCode::kInterrupted) ? 130 : 1;
 }
 
 }  // namespace
@@ -87,6 +74,7 @@ std::unique_ptr<CLI::App> make_program() {
   program->require_subcommand(1);
   program->set_version_flag("--version", "patina " PATINA_VERSION);
   add_enhance(*program);
+  add_batch(*program);
   add_render(*program);
   add_detail(*program);
   add_fit(*program);
@@ -106,9 +94,6 @@ void say_why_when_terminated() {
 int run_program(int argc, char** argv) {
   const std::unique_ptr<CLI::App> program = make_program();
   const bool as_event = asks_for_events(argc, argv);
-  const auto fault = [&](const char* what, const char* hint) {
-    return fail(1, "fault", "", printable(what, 2000) + hint, as_event);
-  };
   try {
     program->parse(argc, argv);
     if (std::fflush(stdout) != 0) return fail(1, "io", "", "standard output cannot be written", as_event);
@@ -119,23 +104,13 @@ int run_program(int argc, char** argv) {
     const std::string text = about_unexpected(*program, argc, argv, e.what());
     return fail(2, "usage", "", printable(text, 2000) + "\nTry `patina --help` or `patina COMMAND --help`.",
                 as_event);
-  } catch (const Error& e) {
-    const std::string context = context_at_command_line(e, chosen_command(*program));
-    return fail(exit_code_of(e.code()), name_of(e.code()), printable(context, 500),
-                printable(e.message(), 2000), as_event);
-  } catch (const std::filesystem::filesystem_error& e) {  // link loops, folders that may not be read
-    const std::string path = e.path2().empty() ? e.path1().string() : e.path2().string();
-    return fail(1, "io", printable(path, 500), e.code().message(), as_event);
-  } catch (const std::system_error& e) {
-    return fail(1, "device", "", refused_by_system(e), as_event);
-  } catch (const std::bad_alloc&) {
-    return fault("out of memory",
-                 "; use fewer or smaller views (--views 4, --resolution 256) or smaller textures "
-                 "(--texture-size 1024)");
-  } catch (const std::exception& e) {
-    return fault(
-        e.what(),
-        "\nThis is a fault of patina; please report it with the command and, if you can, the files.");
+  } catch (...) {
+    Failure failure = current_failure();
+    if (failure.kind == "fault")
+      failure.text +=
+          "\nThis is a fault of patina; please report it with the command and, if you can, the files.";
+    const std::string about = about_at_command_line(failure, chosen_command(*program));
+    return fail(exit_code_of(failure.kind), failure.kind.c_str(), about, failure.text, as_event);
   }
 }
 

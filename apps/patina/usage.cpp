@@ -52,10 +52,11 @@ const CLI::App& chosen_command(const CLI::App& program) {
   return *command;
 }
 
-std::string context_at_command_line(const Error& error, const CLI::App& command) {
-  const bool may_be_setting = error.code() == ErrorCode::kUsage || error.code() == ErrorCode::kDevice;
-  const std::string dashed = "--" + error.context();
-  return may_be_setting && !error.context().empty() && takes(command, dashed) ? dashed : error.context();
+std::string about_at_command_line(const Failure& failure, const CLI::App& command) {
+  const bool may_be_setting =
+      failure.kind == name_of(ErrorCode::kUsage) || failure.kind == name_of(ErrorCode::kDevice);
+  const std::string dashed = "--" + failure.about;
+  return may_be_setting && !failure.about.empty() && takes(command, dashed) ? dashed : failure.about;
 }
 
 std::string about_unexpected(const CLI::App& program, int argc, const char* const* argv,

@@ -32,6 +32,14 @@ Asset read_gltf(const std::filesystem::path& path, std::vector<uint8_t> file) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> files_of(const Asset& asset) {
+  std::vector<std::filesystem::path> files{asset.path};
+  if (!asset.source) return files;
+  for (const std::string& reference : asset.source->references)
+    files.push_back(asset.source->folder() / reference);
+  return files;
+}
+
 Asset read_asset(const std::filesystem::path& path) {
   return read_asset(path, read_file(path));
 }

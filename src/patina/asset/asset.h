@@ -98,6 +98,9 @@ Asset read_asset(const std::filesystem::path& path);
 /// The same, `file` being the content of `path`, which need not exist.
 Asset read_asset(const std::filesystem::path& path, std::vector<uint8_t> file);
 
+/// The file itself and those that it names, found or not.
+std::vector<std::filesystem::path> files_of(const Asset& asset);
+
 /// Positions and lights relative to another origin; the asset stays where it is in the world.
 void set_origin(Asset& asset, const glm::dvec3& origin);
 

@@ -21,6 +21,30 @@ std::string assemble(std::string_view context, std::string_view message) {
 
 }  // namespace
 
+const char* name_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kUsage:
+      return "usage";
+    case ErrorCode::kNotFound:
+      return "not found";
+    case ErrorCode::kFormat:
+      return "format";
+    case ErrorCode::kUnsupported:
+      return "unsupported";
+    case ErrorCode::kLimit:
+      return "limit";
+    case ErrorCode::kIo:
+      return "io";
+    case ErrorCode::kDevice:
+      return "device";
+    case ErrorCode::kInterrupted:
+      return "interrupted";
+    case ErrorCode::kJobs:
+      return "jobs";
+  }
+  return "";
+}
+
 std::string printable(std::string_view text, size_t max_length) {
   std::string out;
   for (size_t i = 0; i < text.size();) {

@@ -17,7 +17,11 @@ enum class ErrorCode {
   kIo,           // reading or writing failed
   kDevice,       // out of memory, missing instruction set, CUDA failure
   kInterrupted,  // the user asked to stop
+  kJobs,         // some of several jobs failed, each with a reason of its own
 };
+
+/// "usage", "not found", ...: the kind of a failure for programs.
+const char* name_of(ErrorCode code);
 
 /// `message` is one sentence for a person; `context` is where it happened (a file, a JSON path, a tensor
 /// name) and is printed before it. Control characters in either are escaped, so a hostile file cannot write

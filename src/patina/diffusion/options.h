@@ -35,6 +35,7 @@ struct ModelPaths {
   std::vector<std::filesystem::path> embeddings = {};  // textual inversion
   std::vector<std::filesystem::path> model_dirs = {};  // folders of other tools, where models are looked for
   PredictionChoice prediction = PredictionChoice::kAuto;
+  bool operator==(const ModelPaths&) const = default;
 };
 
 struct ModelOptions {

@@ -11,4 +11,12 @@ void set_num_threads(int num_threads) {
   at::set_num_threads(patina::num_threads());
 }
 
+int num_network_threads() {
+  return at::get_num_threads();
+}
+
+void set_num_network_threads(int num_threads) {
+  at::set_num_threads(num_threads);
+}
+
 }  // namespace patina::nn

@@ -31,12 +31,26 @@ void check_export(const Workbench& bench, const fs::path& output, const Progress
   for (const std::string& note : asset::plan_export(bench.asset, output).notes) progress.warn(note);
 }
 
+std::vector<fs::path> files_of(const Workbench& bench) {
+  std::vector<fs::path> files = asset::files_of(bench.asset);
+  if (!bench.context) return files;
+  const std::vector<fs::path> context = asset::files_of(*bench.context);
+  files.insert(files.end(), context.begin(), context.end());
+  return files;
+}
+
 }  // namespace
 
-void enhance(Config config, RunFolder& run, const RunProgress& progress) {
+std::vector<fs::path> enhance(Config config, RunFolder& run, const RunProgress& progress) {
+  ModelShelf models(/*keeps=*/false);
+  return enhance(std::move(config), run, progress, models);
+}
+
+std::vector<fs::path> enhance(Config config, RunFolder& run, const RunProgress& progress,
+                              ModelShelf& models) {
   settle(config);
   check_inputs(config);
-  ResolvedModel model(config.edit);
+  std::shared_ptr<ResolvedModel> model = models.take(config.edit);
   warn_of_unknown_words(config.edit, progress);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
@@ -46,15 +60,19 @@ void enhance(Config config, RunFolder& run, const RunProgress& progress) {
   part_prompts(bench, strength, config.edit);
   read_exemplars(bench, strength, config.edit);
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
-  if (only_edits(config)) return edit_variants(bench, strength, views, config, model, run, progress);
+  if (only_edits(config)) {
+    edit_variants(bench, strength, views, config, *model, run, progress);
+    return files_of(bench);
+  }
   const std::vector<Image> edited =
-      edit_stage(bench, strength, views, config.edit, model, run, progress);  // → detail/
-  model.unload();
+      edit_stage(bench, strength, views, config.edit, *model, run, progress);  // → detail/
+  model.reset();
   FittedMaterials fitted =
       fit_stage(bench, strength, views, edited, config.fit, run, progress);  // → textures/
   fitted = blended(bench, std::move(fitted), config.blend);
   write_output(bench, fitted, config.output);                                          // → the asset
   report_stage(bench, strength, views, edited, fitted, config.report, run, progress);  // → report.html
+  return files_of(bench);
 }
 
 void run_render(Config config, RunFolder& run, const RunProgress& progress) {

@@ -8,8 +8,11 @@
 namespace patina::pipeline {
 
 /// Runs every stage that has to run and writes config.output. Throws Error; what was finished stays in the
-/// run folder.
-void enhance(Config config, RunFolder& run, const RunProgress& progress);
+/// run folder. Runs side by side may share a shelf of models; without one a run has its model for itself.
+/// Returns the files that asset and context were read from.
+std::vector<std::filesystem::path> enhance(Config config, RunFolder& run, const RunProgress& progress);
+std::vector<std::filesystem::path> enhance(Config config, RunFolder& run, const RunProgress& progress,
+                                           ModelShelf& models);
 
 /// One stage on the run folder; those before it have run. The fit writes config.output too, if there is one.
 void run_render(Config config, RunFolder& run, const RunProgress& progress);

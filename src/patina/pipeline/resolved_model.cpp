@@ -61,6 +61,7 @@ struct ResolvedModel::State {
   std::optional<diffusion::ModelParts> parts;  // until they are loaded: they keep the files mapped
   std::string hash;
   std::optional<diffusion::Model> model;
+  std::mutex mutex;  // whoever holds it works with the networks
 };
 
 ResolvedModel::ResolvedModel(const EditSettings& settings)
@@ -68,7 +69,8 @@ ResolvedModel::ResolvedModel(const EditSettings& settings)
           .options = {.dtype = settings.dtype, .low_memory = settings.low_memory, .device = settings.device},
           .parts = find_parts(settings),
           .hash = {},
-          .model = std::nullopt}) {
+          .model = std::nullopt,
+          .mutex = {}}) {
   state_->hash = hash_of_files(state_->parts->files);
 }
 
@@ -96,6 +98,31 @@ bool ResolvedModel::is_loaded() const {
 void ResolvedModel::unload() {
   state_->model.reset();
   state_->parts.reset();
+}
+
+std::unique_lock<std::mutex> ResolvedModel::alone() {
+  return std::unique_lock(state_->mutex);
+}
+
+std::shared_ptr<ResolvedModel> ModelShelf::take(const EditSettings& settings) {
+  const std::lock_guard lock(mutex_);
+  Known asked{settings.model, settings.dtype, settings.device, settings.low_memory,
+              settings.options.scheduler};
+  std::shared_ptr<ResolvedModel> model = latest_.lock();
+  if (model && known_ == asked) return model;
+  model.reset();
+  kept_.reset();  // before another one is opened
+  model = std::make_shared<ResolvedModel>(settings);
+  known_ = std::move(asked);
+  latest_ = model;
+  if (keeps_) kept_ = model;
+  return model;
+}
+
+void ModelShelf::stop_keeping() {
+  const std::lock_guard lock(mutex_);
+  keeps_ = false;
+  kept_.reset();
 }
 
 }  // namespace patina::pipeline

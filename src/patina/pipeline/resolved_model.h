@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "patina/diffusion/model.h"
@@ -28,9 +29,43 @@ class ResolvedModel {
   bool is_loaded() const;
   void unload();
 
+  /// Waits until no other run works with the networks, and keeps them from others as long as the lock lives.
+  /// Runs that share a model take it before loaded().
+  std::unique_lock<std::mutex> alone();
+
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// The models of several runs: runs that ask for the same one share it, so that it is loaded once. May be
+/// used by several threads.
+class ModelShelf {
+ public:
+  /// A shelf that keeps a model has it ready for the next run until another model is asked for; else a model
+  /// goes with the last run that holds it.
+  explicit ModelShelf(bool keeps) : keeps_(keeps) {}
+
+  /// Throws as ResolvedModel's constructor.
+  std::shared_ptr<ResolvedModel> take(const EditSettings& settings);
+  /// From now on nothing is kept.
+  void stop_keeping();
+
+ private:
+  struct Known {
+    diffusion::ModelPaths paths;
+    diffusion::Dtype dtype;
+    diffusion::Device device;
+    bool low_memory;
+    diffusion::Scheduler scheduler;  // checked with the files
+
+    bool operator==(const Known&) const = default;
+  };
+  std::mutex mutex_;
+  bool keeps_;
+  Known known_{};
+  std::weak_ptr<ResolvedModel> latest_;
+  std::shared_ptr<ResolvedModel> kept_;
 };
 
 }  // namespace patina::pipeline

@@ -151,6 +151,7 @@ std::vector<Image> edit_stage(const Workbench& bench, const Strength& strength, 
   const std::vector<Exemplar> exemplars = read_exemplars(bench, strength, settings);
   const std::string key = edit_key(bench, strength, views, settings, exemplars, resolved);
   adopt_variant(run, settings.options.seed, key);
+  const std::unique_lock alone = resolved.alone();  // one edit at a time has the networks
   run.run_stage("detail", key, progress, [&] {
     const auto start = Clock::now();
     const int64_t bytes_before = resident_bytes();
