@@ -17,8 +17,6 @@ constexpr std::string_view kStyle = R"(
 .cards { display:grid; grid-template-columns:repeat(auto-fill,minmax(min(100%,15rem),1fr)); gap:2rem 1.5rem;
   margin-top:1.5rem; }
 .card { min-width:0; }
-.card .nothing { aspect-ratio:1; display:grid; place-items:center; background:var(--raised); color:var(--quiet);
-  border-radius:3px; }
 .card h3 { margin:.6rem 0 .1rem; }
 .card p { margin:.15rem 0; font-size:.9375rem; overflow-wrap:anywhere; }
 .card .words { font-family:var(--serif); font-style:italic; }
@@ -43,7 +41,7 @@ std::string link(const std::filesystem::path& to, std::string_view text) {
 }
 
 std::string picture_of(const BatchCard& card) {
-  if (card.picture.empty()) return "<div class=\"nothing\">no picture</div>\n";
+  if (card.picture.empty()) return "";
   const std::string image = fmt::format("<img loading=\"lazy\" alt=\"{}\" src=\"{}\">",
                                         escaped(fmt::format("{} as “{}”", card.asset, card.prompt), 300),
                                         data_uri(card.picture, "image/webp"));
