@@ -9,6 +9,7 @@
 #include "patina/asset/gltf_materials.h"
 #include "patina/asset/gltf_scene.h"
 #include "patina/asset/obj_reader.h"
+#include "patina/asset/unwrap.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
@@ -155,10 +156,8 @@ void require_enhanceable(const Asset& asset) {
     throw Error(
         ErrorCode::kFormat, asset.path.string(),
         fmt::format(
-            "the meshes have no texture coordinates (mesh '{}'), so no texture can be put on them; unwrap "
-            "them first, "
-            "for instance in Blender: Edit Mode, select all, UV > Smart UV Project, then export again",
-            printable(without_uv, 60)));
+            "the meshes have no texture coordinates (mesh '{}'), so no texture can be put on them; {}",
+            printable(without_uv, 60), kHowToUnwrap));
 }
 
 }  // namespace patina::asset

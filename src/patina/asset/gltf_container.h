@@ -9,7 +9,7 @@ namespace patina::asset {
 
 /// `file` is the content of `path`. Warnings are appended to the result's list.
 struct OpenedGltf {
-  std::shared_ptr<const SourceDocument> document;
+  std::shared_ptr<SourceDocument> document;
   std::vector<std::string> warnings;
 };
 OpenedGltf open_gltf(const std::filesystem::path& path, std::vector<uint8_t> file);

@@ -9,6 +9,7 @@
 
 #include "patina/asset/extensions.h"
 #include "patina/asset/gltf_container.h"
+#include "patina/asset/uri.h"
 #include "patina/base/parallel.h"
 #include "patina/base/utf8.h"
 #include "patina/image/image_header.h"
@@ -204,13 +205,26 @@ std::optional<PendingImage> pending_image(const SourceDocument& d, size_t index,
   }
 }
 
+// Keeps the name of an image that is not there if it stands for one file a UDIM tile.
+void note_tiles(SourceDocument& d, int image, Asset& asset) {
+  const auto uri = d.root().at("images")[static_cast<size_t>(image)].find("uri");
+  if (!uri) return;
+  const std::string file = percent_decoded(uri->string(), uri->where());
+  if (!names_tiles(file)) return;
+  for (Material& m : asset.materials)
+    for (const TextureRef* ref : textures_of(m))
+      if (ref->image == image)
+        return d.tiled_textures.push_back({m.name, file, tiles_on_disk(d.folder(), "", file)});
+}
+
 // Decodes the images that materials refer to, several at a time.
-void read_images(const SourceDocument& d, Asset& asset, const std::set<int>& shown_materials) {
+void read_images(SourceDocument& d, Asset& asset, const std::set<int>& shown_materials) {
   const auto images = d.root().find("images");
   if (!images) return;
   const size_t count = images->size();
   asset.images.resize(count);
   asset.image_names.resize(count);
+  d.image_files.resize(count);
   std::set<int> used, shown;
   for (size_t m = 0; m < asset.materials.size(); ++m)
     for (const TextureRef* ref : textures_of(asset.materials[m])) {
@@ -228,6 +242,7 @@ void read_images(const SourceDocument& d, Asset& asset, const std::set<int>& sho
     if (!used.contains(static_cast<int>(i))) continue;
     auto found = pending_image(d, i, shown.contains(static_cast<int>(i)), asset);
     if (!found) {
+      if (shown.contains(static_cast<int>(i))) note_tiles(d, static_cast<int>(i), asset);
       for (Material& m : asset.materials)
         for (TextureRef* ref : textures_of(m))
           if (ref->image == static_cast<int>(i)) *ref = {};
@@ -235,6 +250,7 @@ void read_images(const SourceDocument& d, Asset& asset, const std::set<int>& sho
     }
     pending.push_back(*std::move(found));
     const PendingImage& p = pending.back();
+    d.image_files[i] = p.encoded.reference;
     if (asset.image_names[i].empty())
       asset.image_names[i] = short_name(as_utf8(std::filesystem::path(p.encoded.reference).stem().string()));
     encoded_bytes += p.encoded.reference.empty() ? 0 : p.encoded.bytes.size();
@@ -272,7 +288,7 @@ std::string short_name(const std::string& name) {
   return name.substr(0, end);
 }
 
-void read_materials(const SourceDocument& d, Asset& asset) {
+void read_materials(SourceDocument& d, Asset& asset) {
   const std::set<int> shown = materials_of_meshes(d.json);
   if (const auto materials = d.root().find("materials"))
     for (size_t i = 0; i < materials->size(); ++i)

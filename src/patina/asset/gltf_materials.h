@@ -7,7 +7,7 @@ namespace patina::asset {
 
 /// Fills `asset.materials`, `asset.images` (one entry a glTF image, decoded where a material refers to it)
 /// and `asset.image_names`.
-void read_materials(const SourceDocument& document, Asset& asset);
+void read_materials(SourceDocument& document, Asset& asset);
 
 /// The material that glTF prescribes for primitives without one.
 Material default_material();

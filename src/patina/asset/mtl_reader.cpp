@@ -104,6 +104,12 @@ class MtlReader {
     if (!slot) return;
     const bool may_be_height = keyword == "map_bump" || keyword == "bump";
     if (may_be_height && *slot) return;  // beside a normal map, or named twice
+    if (!found && names_tiles(parsed.file)) {
+      const std::string file(unquoted(parsed.file));
+      if (!current_->tiled)
+        current_->tiled = TiledTexture{current_->material.name, file, tiles_on_disk(folder_, base_, file)};
+      return;
+    }
     if (!found) {
       note(fmt::format(
           "the texture file '{}' is not in the asset's folder, so the material goes without it; put "

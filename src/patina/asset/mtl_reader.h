@@ -18,6 +18,7 @@ struct MtlTexture {
 struct MtlMaterial {
   Material material;  // factors; textures follow from the statements below
   std::optional<MtlTexture> base_color, normal, roughness, metallic, emissive;
+  std::optional<TiledTexture> tiled;  // the first one that is by tiles, and so not read
   bool normal_may_be_height = false;  // map_Bump: some programs write a normal map here, some a height field
 };
 

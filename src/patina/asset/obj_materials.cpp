@@ -1,6 +1,8 @@
 #include "patina/asset/obj_materials.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -123,9 +125,9 @@ int ObjMaterials::named(const std::string& rest) {
     material.metallic_factor = 0.0f;
     return add_material(rest, std::move(material));
   }
-  if (auto& unused = unused_[static_cast<size_t>(index)]) {
-    asset_.materials[static_cast<size_t>(index)] = with_textures(*std::move(unused));
-    unused.reset();
+  if (auto mtl = std::exchange(unused_[static_cast<size_t>(index)], std::nullopt)) {
+    if (mtl->tiled) document_.tiled_textures.push_back(*mtl->tiled);
+    asset_.materials[static_cast<size_t>(index)] = with_textures(*std::move(mtl));
   }
   return index;
 }
@@ -153,12 +155,13 @@ int ObjMaterials::image_index(const std::filesystem::path& path) {
   if (image_bytes_ > memory_budget(document_.file.size() + encoded_bytes_).image_bytes)
     throw Error(ErrorCode::kLimit, where,
                 "the images up to this one decode to more memory than files of this size may");
-  return images_[key] = add_image(decode_image(bytes, where), path.stem().string());
+  return images_[key] = add_image(decode_image(bytes, where), path, path.stem().string());
 }
 
-int ObjMaterials::add_image(Image image, const std::string& name) {
+int ObjMaterials::add_image(Image image, const std::filesystem::path& path, const std::string& name) {
   asset_.images.push_back(std::move(image));
   asset_.image_names.push_back(short_name(as_utf8(name)));
+  document_.image_files.push_back(path.lexically_relative(document_.folder()).string());
   return static_cast<int>(asset_.images.size()) - 1;
 }
 
@@ -224,7 +227,7 @@ void ObjMaterials::pack_roughness_metallic(const MtlMaterial& mtl, Material& m) 
       if (metallic) packed.at(x, y)[2] = nearest(*metallic, *mtl.metallic);
     }
   m.metallic_roughness = texture_ref(placed);
-  m.metallic_roughness.image = add_image(std::move(packed), "roughness_metallic");
+  m.metallic_roughness.image = add_image(std::move(packed), placed.path, "roughness_metallic");
   if (roughness) m.roughness_factor = 1.0f;
   if (metallic) m.metallic_factor = 1.0f;
 }

@@ -34,7 +34,7 @@ class ObjMaterials {
   void read_library(const std::filesystem::path& relative);
   int add_material(const std::string& name, Material material);
   int image_index(const std::filesystem::path& path);
-  int add_image(Image image, const std::string& name);
+  int add_image(Image image, const std::filesystem::path& path, const std::string& name);
   TextureRef texture_ref(const MtlTexture& texture);
   Material with_textures(MtlMaterial mtl);
   void pack_roughness_metallic(const MtlMaterial& mtl, Material& m);

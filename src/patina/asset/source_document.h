@@ -14,6 +14,7 @@
 
 #include "patina/asset/asset.h"
 #include "patina/asset/json_view.h"
+#include "patina/asset/uv_tiles.h"
 
 namespace patina::asset {
 
@@ -42,6 +43,9 @@ struct SourceDocument {
 
   std::vector<std::string>
       references;  // decoded relative paths of all other files that the asset names, found or not
+
+  std::vector<std::string> image_files;      // one an image of the asset: its relative path, or ""
+  std::vector<TiledTexture> tiled_textures;  // those that a file name with a token told, of materials in use
 
   // OBJ
   std::string converted;                    // the text as UTF-8 where the file is UTF-16

@@ -8,6 +8,8 @@
 
 #include "patina/asset/asset.h"
 #include "patina/asset/material_maps.h"
+#include "patina/asset/unwrap.h"
+#include "patina/asset/uv_tiles.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
@@ -31,8 +33,20 @@ std::string describe_texture(const asset::Asset& asset, const char* slot, const 
   return text + "\n";
 }
 
-std::string describe_uv(const asset::UvState& uv) {
-  if (uv.missing) return "missing: unwrap the mesh before enhancing it (Blender: U, Smart UV Project)";
+// Where there is one by tiles; the names of materials are mostly different.
+std::string describe_tiles(const std::vector<asset::TiledTexture>& tiled, const asset::Material& material) {
+  for (const asset::TiledTexture& texture : tiled)
+    if (texture.material == material.name)
+      return fmt::format(
+          "    a picture for each UDIM tile, {} (found: {}): give each tile a material of its own before you "
+          "enhance it\n",
+          printable(texture.file, 100), texture.tiles.empty() ? "none" : asset::tile_list(texture.tiles));
+  return "";
+}
+
+std::string describe_uv(const asset::UvState& uv, const std::vector<int>& tiles) {
+  if (uv.missing) return std::string("missing; ") + asset::kHowToUnwrap;
+  if (uv.zero_area > 0.99f) return std::string("have no area; ") + asset::kHowToUnwrap;
   std::string text = uv.uv_set > 0 ? fmt::format("of set {} ", uv.uv_set) : "";
   text += fmt::format("cover {:.0f} % of the tile, from ({:.3g}, {:.3g}) to ({:.3g}, {:.3g})",
                       100 * uv.covered, uv.min.x, uv.min.y, uv.max.x, uv.max.y);
@@ -43,8 +57,11 @@ std::string describe_uv(const asset::UvState& uv) {
     text += fmt::format("; {:.0f} % of the covered texels are shared: detail will repeat there",
                         100 * uv.overlapping);
   if (uv.mirrored > 0.01f) text += fmt::format("; {:.0f} % of the triangles are mirrored", 100 * uv.mirrored);
-  if (uv.min.x < 0 || uv.min.y < 0 || uv.max.x > 1 || uv.max.y > 1)
+  if (uv.min.x < 0 || uv.min.y < 0 || uv.max.x > 1 || uv.max.y > 1) {
     text += "; out of [0,1]: they wrap around";
+    if (!tiles.empty())
+      text += fmt::format(" (UDIM tile{} {})", tiles.size() > 1 ? "s" : "", asset::tile_list(tiles));
+  }
   return text;
 }
 
@@ -53,6 +70,7 @@ std::string describe_asset(const fs::path& path) {
   asset::require_enhanceable(asset);
   const asset::Bounds box = asset::bounds(asset);
   const std::vector<asset::UvState> uv = asset::uv_states(asset);
+  const std::vector<asset::TiledTexture> tiled = asset::tiled_textures(asset);
 
   size_t num_triangles = 0;
   std::map<int, size_t> triangles_of;
@@ -85,9 +103,13 @@ std::string describe_asset(const fs::path& path) {
     text += describe_texture(asset, "normal", material.normal);
     text += describe_texture(asset, "occlusion", material.occlusion);
     text += describe_texture(asset, "emissive", material.emissive);
-    if (!material.base_color && !material.metallic_roughness && !material.normal)
+    const std::string tiles = describe_tiles(tiled, material);
+    text += tiles;
+    if (tiles.empty() && !material.base_color && !material.metallic_roughness && !material.normal)
       text += "    no textures: new ones are made from its factors\n";
-    if (triangles_of[static_cast<int>(m)] > 0) text += "    UVs " + describe_uv(uv[m]) + "\n";
+    if (triangles_of[static_cast<int>(m)] > 0)
+      text +=
+          "    UVs " + describe_uv(uv[m], asset::uv_tiles(asset, static_cast<int>(m), uv[m].uv_set)) + "\n";
   }
   if (!asset.lights.empty()) text += fmt::format("  {} punctual light(s)\n", asset.lights.size());
   if (!asset.extensions_used.empty()) {

@@ -7,6 +7,8 @@
 #include <fmt/ranges.h>
 
 #include "patina/asset/json_view.h"
+#include "patina/asset/unwrap.h"
+#include "patina/asset/uv_tiles.h"
 #include "patina/base/error.h"
 #include "patina/base/files.h"
 #include "patina/base/text.h"
@@ -119,9 +121,8 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const std::vector<
       const std::string fault = uv.missing ? "has no UVs" : "has UVs without any area";
       if (!names.empty())
         throw Error(ErrorCode::kFormat, asset.path.string(),
-                    fmt::format("material '{}' {}, so it cannot carry a texture; unwrap it first (Blender: "
-                                "U, Smart UV Project)",
-                                name, fault));
+                    fmt::format("material '{}' {}, so it cannot carry a texture; {}", name, fault,
+                                asset::kHowToUnwrap));
       wanted[m] = false;
       warnings.push_back(fmt::format("Material '{}' {} and stays as it is.", name, fault));
       continue;
@@ -148,9 +149,9 @@ std::vector<bool> choose_materials(const asset::Asset& asset, const std::vector<
     }
   }
   if (std::find(wanted.begin(), wanted.end(), true) == wanted.end())
-    throw Error(ErrorCode::kFormat, asset.path.string(),
-                "none of its materials has UVs that could carry a texture; unwrap the mesh first (Blender: "
-                "U, Smart UV Project) and export it again");
+    throw Error(
+        ErrorCode::kFormat, asset.path.string(),
+        fmt::format("none of its materials has UVs that could carry a texture; {}", asset::kHowToUnwrap));
   return wanted;
 }
 
@@ -214,6 +215,7 @@ Workbench open_workbench(const InputSettings& inputs, const Progress& progress) 
   Workbench bench;
   bench.asset = asset::read_asset(inputs.asset);
   asset::require_enhanceable(bench.asset);
+  asset::refuse_tiled_textures(bench.asset);
   bench.warnings = bench.asset.warnings;
   bench.chosen = choose_materials(bench.asset, inputs.materials, bench.warnings);
   bench.maps = asset::resolve_materials(bench.asset);
