@@ -15,7 +15,8 @@ std::filesystem::path job_folder(const BatchJob& job);
 /// A hash of the job's options and of the names, sizes and dates of the files that they name.
 std::string job_key(const BatchJob& job);
 
-/// `inputs` are files that are not named by options: those that the asset refers to.
+/// `inputs` are files that options need not name: those that the asset refers to, and those of the model,
+/// which names and model folders lead to.
 void write_record(const BatchJob& job, const JobRecord& record, const std::string& key = {},
                   const std::vector<std::filesystem::path>& inputs = {});
 

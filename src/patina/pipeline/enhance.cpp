@@ -31,8 +31,9 @@ void check_export(const Workbench& bench, const fs::path& output, const Progress
   for (const std::string& note : asset::plan_export(bench.asset, output).notes) progress.warn(note);
 }
 
-std::vector<fs::path> files_of(const Workbench& bench) {
+std::vector<fs::path> files_of(const Workbench& bench, const ResolvedModel& model) {
   std::vector<fs::path> files = asset::files_of(bench.asset);
+  files.insert(files.end(), model.files().begin(), model.files().end());
   if (!bench.context) return files;
   const std::vector<fs::path> context = asset::files_of(*bench.context);
   files.insert(files.end(), context.begin(), context.end());
@@ -54,6 +55,7 @@ std::vector<fs::path> enhance(Config config, RunFolder& run, const RunProgress& 
   warn_of_unknown_words(config.edit, progress);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
+  const std::vector<fs::path> files = files_of(bench, *model);
   check_export(bench, config.output, progress);
   const Strength strength = mask_stage(bench, config.masks, run, progress);  // → masks/
   // Refuse what is wrong with them before anything is rendered.
@@ -62,7 +64,7 @@ std::vector<fs::path> enhance(Config config, RunFolder& run, const RunProgress& 
   const RenderedViews views = render_stage(bench, config.render, run, progress);  // → views/
   if (only_edits(config)) {
     edit_variants(bench, strength, views, config, *model, run, progress);
-    return files_of(bench);
+    return files;
   }
   const std::vector<Image> edited =
       edit_stage(bench, strength, views, config.edit, *model, run, progress);  // → detail/
@@ -72,7 +74,7 @@ std::vector<fs::path> enhance(Config config, RunFolder& run, const RunProgress& 
   fitted = blended(bench, std::move(fitted), config.blend);
   write_output(bench, fitted, config.output);                                          // → the asset
   report_stage(bench, strength, views, edited, fitted, config.report, run, progress);  // → report.html
-  return files_of(bench);
+  return files;
 }
 
 void run_render(Config config, RunFolder& run, const RunProgress& progress) {

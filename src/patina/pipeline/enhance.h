@@ -9,7 +9,7 @@ namespace patina::pipeline {
 
 /// Runs every stage that has to run and writes config.output. Throws Error; what was finished stays in the
 /// run folder. Runs side by side may share a shelf of models; without one a run has its model for itself.
-/// Returns the files that asset and context were read from.
+/// Returns the files that asset, context and model were read from.
 std::vector<std::filesystem::path> enhance(Config config, RunFolder& run, const RunProgress& progress);
 std::vector<std::filesystem::path> enhance(Config config, RunFolder& run, const RunProgress& progress,
                                            ModelShelf& models);

@@ -59,6 +59,7 @@ diffusion::ModelParts find_parts(const EditSettings& settings) {
 struct ResolvedModel::State {
   diffusion::ModelOptions options;
   std::optional<diffusion::ModelParts> parts;  // until they are loaded: they keep the files mapped
+  std::vector<fs::path> files;
   std::string hash;
   std::optional<diffusion::Model> model;
   std::mutex mutex;  // whoever holds it works with the networks
@@ -68,10 +69,12 @@ ResolvedModel::ResolvedModel(const EditSettings& settings)
     : state_(new State{
           .options = {.dtype = settings.dtype, .low_memory = settings.low_memory, .device = settings.device},
           .parts = find_parts(settings),
+          .files = {},
           .hash = {},
           .model = std::nullopt,
           .mutex = {}}) {
-  state_->hash = hash_of_files(state_->parts->files);
+  state_->files = state_->parts->files;
+  state_->hash = hash_of_files(state_->files);
 }
 
 ResolvedModel::~ResolvedModel() = default;
@@ -80,6 +83,10 @@ ResolvedModel& ResolvedModel::operator=(ResolvedModel&&) noexcept = default;
 
 const std::string& ResolvedModel::hash() const {
   return state_->hash;
+}
+
+const std::vector<fs::path>& ResolvedModel::files() const {
+  return state_->files;
 }
 
 const diffusion::Model& ResolvedModel::loaded() {

@@ -2,9 +2,11 @@
 // edit that needs them.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "patina/diffusion/model.h"
 #include "patina/pipeline/settings.h"
@@ -22,6 +24,8 @@ class ResolvedModel {
 
   /// Of the names, sizes and dates of all files: weights are gigabytes, these tell whether they changed.
   const std::string& hash() const;
+  /// All of them, wherever names and model folders led to.
+  const std::vector<std::filesystem::path>& files() const;
 
   /// The networks; loaded by the first call. They stay until unload(), after which they cannot be loaded
   /// again.
