@@ -7,6 +7,7 @@
 #   make check-package      runs them in empty systems; must be root
 #   make check-blender      the tests of the Blender extension, in Blender without a window (docs/blender.md)
 #   make blender-extension  build/blender/patina_enhance.zip, which Blender installs
+#   make check-slurm SLURM_JOBS=200   a batch on a Slurm of one machine that the test starts; must be root (docs/batch.md)
 #   make sanitise     the suites that finish in minutes, under the address and undefined-behaviour sanitisers
 #   make fuzz TARGET=gltf MINUTES=5   libFuzzer on one target (docs/reliability.md lists them)
 #   make kill-campaign KILLS=200      kills small runs at random moments and compares what they leave
@@ -33,9 +34,10 @@ MINI ?= OFF
 MINI_MODEL ?= models/patina-mini
 MINI_SHARDS ?= build/mini_shards
 PEER_PYTHON ?= python3
+SLURM_JOBS ?= 200
 SHARED ?= $(or $(PATINA_SHARED),../shared)
 
-.PHONY: help build package check-package check check-blender blender-extension sanitise fuzz kill-campaign fault-campaign demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
+.PHONY: help build package check-package check check-blender check-slurm blender-extension sanitise fuzz kill-campaign fault-campaign demo setup bench-programs bench-noise bench-attention bench-inverse bench-unet bench-mini train-mini gallery clean format tidy
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -62,6 +64,9 @@ check-package: package
 
 check-blender: build
 	@scripts/check_blender.sh
+
+check-slurm: build
+	@tests/slurm/check.sh build/release $(SLURM_JOBS)
 
 blender-extension:
 	@blender/package.py build/blender/patina_enhance.zip

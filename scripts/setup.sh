@@ -6,6 +6,7 @@
 #   scripts/setup.sh --bench    the peers of the benchmarks as well (Blender)
 #   scripts/setup.sh --fuzz     what make fuzz needs as well (Clang)
 #   scripts/setup.sh --blender  what make check-blender needs as well (Blender, and a screen for its pictures)
+#   scripts/setup.sh --slurm    what make check-slurm needs as well (a Slurm of one machine)
 #   scripts/setup.sh --package  what make package and check-package need as well
 set -euo pipefail
 
@@ -23,6 +24,7 @@ if [[ "${1:-}" == "--ci" ]]; then packages+=(clang-format clang-tidy chromium); 
 if [[ "${1:-}" == "--bench" ]]; then packages+=(blender python3-numpy); fi
 if [[ "${1:-}" == "--fuzz" ]]; then packages+=(clang libclang-rt-14-dev); fi
 if [[ "${1:-}" == "--blender" ]]; then packages+=(blender python3-numpy xvfb libgl1-mesa-dri); fi
+if [[ "${1:-}" == "--slurm" ]]; then packages+=(slurm-wlm munge python3); fi
 if [[ "${1:-}" == "--package" ]]; then packages+=(binutils python3 zstd debootstrap); fi
 
 missing=()

@@ -34,10 +34,6 @@ const char* name_of(JobEvent event) {
   return "";
 }
 
-std::string as_text(const Failure& reason) {
-  return (reason.about.empty() ? "" : reason.about + ": ") + reason.text;
-}
-
 }  // namespace
 
 BatchConsole::BatchConsole(Style style, size_t num_jobs)

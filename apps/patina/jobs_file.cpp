@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr size_t kMaxJobs = 1000000;
 constexpr size_t kMaxSlug = 40;
-constexpr std::array kTopKeys{"output", "assets", "prompts", "seeds", "options", "jobs"};
+constexpr std::array kTopKeys{"output", "assets", "prompts", "seeds", "options", "jobs", "slurm"};
 constexpr std::array kJobKeys{"name", "assets", "prompts", "seeds", "options"};
 
 // Options that the file gives in another way, and how.
@@ -35,6 +35,9 @@ constexpr std::array kReplaced{Replaced{"prompt", "say it in `prompts`"},
                                Replaced{"output", "results go into the folder `output`"},
                                Replaced{"run", "run folders lie beside the results"},
                                Replaced{"threads", "it is for all jobs: give it to `patina batch`"}};
+
+// Options of sbatch that patina sets itself.
+constexpr std::array kSetForSlurm{"array", "chdir", "output", "job-name", "parsable", "wrap"};
 
 // What [[jobs]] may leave to the top of the file.
 struct JobSet {
@@ -50,6 +53,7 @@ class JobsReader {
   explicit JobsReader(const fs::path& file) : file_(file.string()), root_(read_toml(file)) {}
 
   pipeline::Batch read() const;
+  SlurmOptions slurm() const;
 
  private:
   [[noreturn]] void refuse(const toml::node& node, const std::string& message) const {
@@ -57,6 +61,7 @@ class JobsReader {
   }
   template <class Keys>
   void require_known(const toml::table& table, const Keys& keys) const;
+  std::vector<const toml::node*> entries(const toml::node& node, const char* key) const;
   std::vector<std::string> texts(const toml::node& node, const char* key) const;
   std::vector<fs::path> assets(const toml::node& node) const;
   std::vector<uint64_t> seeds(const toml::node& node) const;
@@ -83,26 +88,27 @@ void JobsReader::require_known(const toml::table& table, const Keys& keys) const
   }
 }
 
-std::vector<std::string> JobsReader::texts(const toml::node& node, const char* key) const {
-  std::vector<std::string> found;
-  const auto add = [&](const toml::node& one) {
-    const auto value = one.value_exact<std::string>();
-    if (!value || value->find_first_not_of(" \t\r\n") == std::string::npos)
-      refuse(one, fmt::format("'{}': expected texts in quotes that are not empty", key));
-    found.push_back(*value);
-  };
-  if (const toml::array* list = node.as_array())
-    for (const toml::node& one : *list) add(one);
-  else
-    add(node);
-  if (found.empty()) refuse(node, fmt::format("'{}': expected at least one text, found none", key));
+// The entries of a list, or the one value that stands in its place.
+std::vector<const toml::node*> JobsReader::entries(const toml::node& node, const char* key) const {
+  const toml::array* list = node.as_array();
+  if (!list) return {&node};
+  if (list->empty()) refuse(node, fmt::format("'{}': expected at least one entry, found none", key));
+  std::vector<const toml::node*> found;
+  for (const toml::node& one : *list) found.push_back(&one);
   return found;
 }
 
 std::string JobsReader::text(const toml::node& node, const char* key) const {
-  const std::vector<std::string> found = texts(node, key);
-  if (node.is_array()) refuse(node, fmt::format("'{}': expected one text", key));
-  return found.front();
+  const auto value = node.value_exact<std::string>();
+  if (!value || value->find_first_not_of(" \t\r\n") == std::string::npos)
+    refuse(node, fmt::format("'{}': expected a text in quotes that is not empty", key));
+  return *value;
+}
+
+std::vector<std::string> JobsReader::texts(const toml::node& node, const char* key) const {
+  std::vector<std::string> found;
+  for (const toml::node* one : entries(node, key)) found.push_back(text(*one, key));
+  return found;
 }
 
 // Files that a pattern matches, sorted; nothing for what is no pattern or a file of that very name.
@@ -120,14 +126,15 @@ std::optional<std::vector<fs::path>> matches(const std::string& pattern) {
 
 std::vector<fs::path> JobsReader::assets(const toml::node& node) const {
   std::vector<fs::path> found;
-  for (const std::string& path : texts(node, "assets")) {
+  for (const toml::node* one : entries(node, "assets")) {
+    const std::string path = text(*one, "assets");
     const auto files = matches(path);
     if (!files) {
       found.emplace_back(path);
       continue;
     }
     if (files->empty())
-      refuse(node, fmt::format("'assets': no file matches '{}' in {}", printable(path),
+      refuse(*one, fmt::format("'assets': no file matches '{}' in {}", printable(path),
                                printable(fs::current_path().string())));
     found.insert(found.end(), files->begin(), files->end());
   }
@@ -136,16 +143,11 @@ std::vector<fs::path> JobsReader::assets(const toml::node& node) const {
 
 std::vector<uint64_t> JobsReader::seeds(const toml::node& node) const {
   std::vector<uint64_t> found;
-  const auto add = [&](const toml::node& one) {
-    const auto value = one.value_exact<int64_t>();
-    if (!value || *value < 0) refuse(one, "'seeds': expected whole numbers of 0 or more");
+  for (const toml::node* one : entries(node, "seeds")) {
+    const auto value = one->value_exact<int64_t>();
+    if (!value || *value < 0) refuse(*one, "'seeds': expected whole numbers of 0 or more");
     found.push_back(static_cast<uint64_t>(*value));
-  };
-  if (const toml::array* list = node.as_array())
-    for (const toml::node& one : *list) add(one);
-  else
-    add(node);
-  if (found.empty()) refuse(node, "'seeds': expected at least one number, found none");
+  }
   return found;
 }
 
@@ -257,10 +259,37 @@ pipeline::Batch JobsReader::read() const {
   return batch;
 }
 
+SlurmOptions JobsReader::slurm() const {
+  SlurmOptions found;
+  const toml::node* node = root_.get("slurm");
+  if (!node) return found;
+  const toml::table* table = node->as_table();
+  if (!table) refuse(*node, "'slurm': expected a table of options of sbatch, as [slurm]");
+  for (const auto& [key, value] : *table) {
+    const std::string name(key.str());
+    if (name.empty() || name.find_first_not_of("abcdefghijklmnopqrstuvwxyz-") != std::string::npos)
+      refuse(value, fmt::format("'{}': expected a long name of an option of sbatch, without dashes before it",
+                                printable(name)));
+    if (std::find(kSetForSlurm.begin(), kSetForSlurm.end(), name) != kSetForSlurm.end())
+      refuse(value, fmt::format("'{}' is set by patina", name));
+    const std::vector<std::string> texts = texts_of(value);
+    if (texts.size() != 1 || value.is_array() || texts[0].find_first_of("\r\n") != std::string::npos)
+      refuse(value,
+             fmt::format("'{}': expected one value of one line, or true for an option without one", name));
+    if (const auto flag = value.value_exact<bool>()) {
+      if (*flag) found.emplace_back(name, "");
+    } else {
+      found.emplace_back(name, texts[0]);
+    }
+  }
+  return found;
+}
+
 }  // namespace
 
-pipeline::Batch read_jobs(const fs::path& file) {
-  return JobsReader(file).read();
+JobsFile read_jobs(const fs::path& file) {
+  const JobsReader reader(file);
+  return {reader.read(), reader.slurm()};
 }
 
 }  // namespace patina::app

@@ -5,12 +5,18 @@
 #include <filesystem>
 
 #include "patina/pipeline/batch.h"
+#include "slurm.h"
 
 namespace patina::app {
+
+struct JobsFile {
+  pipeline::Batch batch;
+  SlurmOptions slurm;  // [slurm]
+};
 
 /// Reads the file and lists its jobs, in its order, patterns in that of their names. Paths are relative to
 /// the current folder, as on the command line. Throws Error{kUsage} that names file and line, what was
 /// expected and what was found, also for a pattern that no file matches and for jobs with the same output.
-pipeline::Batch read_jobs(const std::filesystem::path& file);
+JobsFile read_jobs(const std::filesystem::path& file);
 
 }  // namespace patina::app

@@ -2,6 +2,8 @@
 // fails stops the rest.
 #include "patina/pipeline/batch.h"
 
+#include <cstdlib>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +13,7 @@
 #include "patina/base/files.h"
 #include "patina/pipeline/enhance.h"
 #include "process.h"
+#include "slurm.h"
 #include "small_kettle.h"
 #include "support.h"
 
@@ -37,12 +40,13 @@ class BatchFolder {
     return path() / name;
   }
   // `toml` with the folder of the results before it; "DIR" stands for this folder.
-  Batch read(const std::string& toml) const {
+  app::JobsFile read_all(const std::string& toml) const {
     std::string text = "output = \"DIR/results\"\n" + toml;
     for (size_t at; (at = text.find("DIR")) != std::string::npos;) text.replace(at, 3, path().string());
     write_file(jobs(), text);
     return app::read_jobs(jobs());
   }
+  Batch read(const std::string& toml) const { return read_all(toml).batch; }
   ProcessResult run(const std::vector<std::string>& options = {}) const {
     std::vector<std::string> arguments{"batch", jobs().string()};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -119,13 +123,19 @@ TEST(JobsFile, names_the_line_of_what_is_wrong) {
            {"assets = \"a.glb\"\n", {"prompts"}},
            {"assets = \"a.glb\"\nprompts = [\"moss\", \" \"]\n", {"jobs.toml:3", "'prompts'"}},
            {"assets = \"DIR/*.none\"\nprompts = \"moss\"\n", {"jobs.toml:2", "*.none"}},
-           {usual + "seeds = [1, -1]\n", {"jobs.toml:4", "'seeds'"}},
+           {"assets = [\n\"a.glb\",\n\"DIR/*.none\"]\nprompts = \"moss\"\n", {"jobs.toml:4", "*.none"}},
+           {"assets = \"a.glb\"\nprompts = [\n\"moss\",\n\"\"]\n", {"jobs.toml:5", "'prompts'"}},
+           {usual + "seeds = [1,\n -1]\n", {"jobs.toml:5", "'seeds'"}},
+           {usual + "seeds = []\n", {"jobs.toml:4", "'seeds'"}},
            {usual + "seeds = 1.5\n", {"jobs.toml:4", "'seeds'"}},
            {usual + "[options]\nstrength = 2\n", {"jobs.toml:5", "'strength'", "found '2'"}},
            {usual + "[options]\ncolor = 2\n", {"jobs.toml:5", "'color'"}},
            {usual + "[options]\nseed = 2\n", {"jobs.toml:5", "`seeds`"}},
            {usual + "[options]\noutput = \"x.glb\"\n", {"jobs.toml:5", "'output'"}},
            {usual + "[options]\nsteps = [2, 3]\n", {"jobs.toml:5", "one value"}},
+           {usual + "[slurm]\narray = \"0-9\"\n", {"jobs.toml:5", "'array'"}},
+           {usual + "[slurm]\n\"mem=1 --wrap\" = 1\n", {"jobs.toml:5", "long name"}},
+           {usual + "[slurm]\nmem = \"1\\n2\"\n", {"jobs.toml:5", "one line"}},
            {usual + "[[jobs]]\nsteps = 3\n", {"jobs.toml:5", "'steps'", "[options]"}},
            {usual + "[[jobs]]\n[[jobs]]\nseeds = [3, 0]\n", {"two jobs", "a_moss_0", "name"}},
            {"assets = [\"x/a.glb\", \"y/a.glb\"]\nprompts = \"moss\"\n", {"x/a.glb", "y/a.glb"}}}) {
@@ -201,6 +211,11 @@ TEST(Batch, leaves_what_is_done_and_goes_on_where_it_was_stopped) {
   EXPECT_EQ(last["event"], "result");
   EXPECT_TRUE(fs::exists(last.value("page", "")));
 
+  // So that a job is made anew when the file that a model's name leads to has changed.
+  const json record = json::parse(read_text_file(folder.results() / "one_moss_0" / "job.json"));
+  EXPECT_TRUE(std::any_of(record["inputs"].begin(), record["inputs"].end(), [](const json& input) {
+    return input["file"].get<std::string>().ends_with(".safetensors") && input["stamp"] != "";
+  })) << record;
   // What was made from another asset is made anew.
   const fs::path output = batch.jobs[0].config.output;
   EXPECT_TRUE(pipeline::is_done(batch.jobs[0]));
@@ -232,6 +247,80 @@ TEST(Batch, a_job_that_another_process_works_on_is_left_alone) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.error.find("another patina"), std::string::npos) << result.error;
   EXPECT_EQ(pipeline::read_record(batch.jobs[0]).state, pipeline::JobState::kWaiting);
+}
+
+TEST(Batch, says_without_running_what_is_done) {
+  const BatchFolder folder;
+  const Batch batch = folder.read("assets = [\"DIR/1.glb\", \"DIR/2.glb\"]\nprompts = \"moss\"\n" + kSmall);
+  EXPECT_EQ(folder.run({"--task", "0/2"}).exit_code, 1);
+  const ProcessResult result = folder.run({"--collect"});
+  EXPECT_EQ(result.exit_code, 1);
+  for (const char* text : {"failed  1_moss_0: ", "1.glb", "0 done, 1 failed, 1 not finished"})
+    EXPECT_NE(result.error.find(text), std::string::npos) << text << " in " << result.error;
+  const std::string page = read_text_file(folder.results() / "index.html");
+  EXPECT_NE(page.find("<b>1</b> waiting"), std::string::npos);
+  EXPECT_EQ(folder.run({"--collect", "--task", "0/2"}).exit_code, 2);
+  EXPECT_EQ(folder.run({"--chunk", "2"}).exit_code, 2);
+  EXPECT_EQ(folder.run({"--preset", "fast"}).exit_code, 2) << "it stands in the file";
+}
+
+TEST(Slurm, writes_what_sbatch_takes) {
+  EXPECT_EQ(app::ranges_of({}), "");
+  EXPECT_EQ(app::ranges_of({3}), "3");
+  EXPECT_EQ(app::ranges_of({0, 1, 2, 5, 7, 8}), "0-2,5,7-8");
+
+  const BatchFolder folder;
+  const app::JobsFile file = folder.read_all(
+      "assets = \"DIR/1.glb\"\nprompts = \"moss\"\n[slurm]\ncpus-per-task = 8\npartition = \"a b\"\n"
+      "exclusive = true\nrequeue = false\n");
+  const app::SlurmArray array{.jobs_file = "/x/it's.toml",
+                              .num_tasks = 9,
+                              .task_list = {1, 2, 4},
+                              .at_once = 1,
+                              .options = file.slurm};
+  const std::string script = app::slurm_script(file.batch, array, "/opt/patina", "/home/so'me one");
+  for (const char* line :
+       {"#!/bin/sh\n", "#SBATCH --array='1-2,4'\n", "#SBATCH --chdir='/home/so'\\''me one'\n",
+        "#SBATCH --cpus-per-task='8'\n", "#SBATCH --partition='a b'\n", "#SBATCH --exclusive\n",
+        "exec '/opt/patina' batch '/x/it'\\''s.toml' --task \"$SLURM_ARRAY_TASK_ID/9\" "})
+    EXPECT_NE(script.find(line), std::string::npos) << line << " in " << script;
+  EXPECT_EQ(script.find("requeue"), std::string::npos) << script;
+  for (const char* odd : {"/back\\slash", "/two\nlines"})
+    EXPECT_THROW(app::slurm_script(file.batch, array, "/opt/patina", odd), Error) << odd;
+}
+
+// A program of this name that answers as Slurm's would.
+void stand_in_for(const fs::path& program, const std::string& script) {
+  write_file(program, "#!/bin/sh\n" + script + "\n");
+  fs::permissions(program, fs::perms::owner_all);
+}
+
+TEST(Slurm, is_given_the_tasks_that_have_something_to_do) {
+  const BatchFolder folder;
+  folder.add_asset("1.glb");
+  folder.read("assets = [\"DIR/1.glb\", \"DIR/2.glb\", \"DIR/3.glb\"]\nprompts = \"moss\"\n" + kSmall);
+  EXPECT_EQ(folder.run({"--task", "0/3"}).exit_code, 0);
+  stand_in_for(folder.path() / "sbatch", "echo '17;cluster'");
+  stand_in_for(folder.path() / "squeue", "echo '17_0 waits'");
+  const std::string usual_path = std::getenv("PATH");
+  ::setenv("PATH", (folder.path().string() + ":" + usual_path).c_str(), 1);
+
+  const ProcessResult result = folder.run({"--slurm"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.error.find("array 17: 2 of 3 jobs in 2 tasks"), std::string::npos) << result.error;
+  EXPECT_NE(read_text_file(folder.results() / "slurm" / "array.sh").find("--array='1-2'\n"),
+            std::string::npos);
+
+  const ProcessResult again = folder.run({"--slurm", "--chunk", "2"});
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_NE(again.error.find("still queued"), std::string::npos) << again.error;
+
+  stand_in_for(folder.path() / "squeue", "echo 'Invalid job id'; exit 1");
+  stand_in_for(folder.path() / "sbatch", "echo 'no such partition'; exit 1");
+  const ProcessResult refused = folder.run({"--slurm"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.error.find("no such partition"), std::string::npos) << refused.error;
+  ::setenv("PATH", usual_path.c_str(), 1);
 }
 
 }  // namespace

@@ -9,6 +9,10 @@
 
 namespace patina {
 
+std::string as_text(const Failure& failure) {
+  return (failure.about.empty() ? "" : failure.about + ": ") + failure.text;
+}
+
 Failure current_failure() {
   try {
     throw;

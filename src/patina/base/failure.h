@@ -13,6 +13,9 @@ struct Failure {
   std::string text;   // one sentence for a person; like `about` free of control characters
 };
 
+/// "kettle.glb: is no glTF file": what it is about and the sentence.
+std::string as_text(const Failure& failure);
+
 /// Of the exception that is being handled; to be called in a catch block.
 Failure current_failure();
 

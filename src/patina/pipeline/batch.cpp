@@ -233,8 +233,7 @@ fs::path write_index(const Batch& batch) {
                            .page = {},
                            .picture = {},
                            .seconds = record.seconds};
-    if (record.state == JobState::kFailed)
-      card.reason = (record.reason.about.empty() ? "" : record.reason.about + ": ") + record.reason.text;
+    if (record.state == JobState::kFailed) card.reason = as_text(record.reason);
     if (record.state == JobState::kDone) {
       const fs::path run = run_folder_path(job.config);
       card.result = from_index(batch, job.config.output);
@@ -245,7 +244,7 @@ fs::path write_index(const Batch& batch) {
     }
     page.cards.push_back(std::move(card));
   }
-  const fs::path path = batch.folder / "index.html";
+  fs::path path = batch.folder / "index.html";
   report::write_batch_page(path, page);
   return path;
 }

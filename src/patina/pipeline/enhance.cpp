@@ -55,7 +55,7 @@ std::vector<fs::path> enhance(Config config, RunFolder& run, const RunProgress& 
   warn_of_unknown_words(config.edit, progress);
   write_config(config, run);
   const Workbench bench = open_workbench(config.inputs, progress);  // asset, scene, cameras
-  const std::vector<fs::path> files = files_of(bench, *model);
+  std::vector<fs::path> files = files_of(bench, *model);
   check_export(bench, config.output, progress);
   const Strength strength = mask_stage(bench, config.masks, run, progress);  // → masks/
   // Refuse what is wrong with them before anything is rendered.
