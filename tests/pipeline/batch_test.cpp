@@ -223,6 +223,34 @@ TEST(Batch, leaves_what_is_done_and_goes_on_where_it_was_stopped) {
   EXPECT_FALSE(pipeline::is_done(batch.jobs[0]));
 }
 
+TEST(Batch, jobs_of_one_asset_are_rendered_once) {
+  const BatchFolder folder;
+  folder.add_asset("one.glb");
+  folder.add_asset("two.glb");
+  const Batch batch =
+      folder.read("assets = \"DIR/*.glb\"\nprompts = [\"moss\", \"rust\"]\n" + kSmall +
+                  "[[jobs]]\n[[jobs]]\nassets = \"DIR/one.glb\"\nprompts = \"ice\"\nseeds = 3\n");
+  std::vector<std::string> told;
+  pipeline::BatchHooks hooks;
+  hooks.progress_of = [&](const pipeline::BatchJob& job) {
+    pipeline::RunProgress progress;
+    progress.on_stage = [&](std::string_view stage, pipeline::StageEvent event) {
+      if (stage != "render" || event == pipeline::StageEvent::kFinished) return;
+      told.push_back(job.name + (event == pipeline::StageEvent::kReused ? " takes" : " renders"));
+    };
+    return progress;
+  };
+  EXPECT_TRUE(pipeline::run_batch(batch, {.at_once = 1}, hooks).empty());
+  EXPECT_EQ(told, (std::vector<std::string>{"one_moss_0 renders", "two_moss_0 renders", "one_ice_3 renders",
+                                            "one_rust_0 takes", "two_rust_0 takes"}));
+  const fs::path alone = folder.path() / "alone" / "one.glb";
+  const ProcessResult run = patina({"enhance", (folder.path() / "one.glb").string(), "-p", "rust", "-o",
+                                    alone.string(), "--views", "4", "--resolution", "64", "--samples", "1",
+                                    "--steps", "2", "--fit-iterations", "1", "--turntable", "0"});
+  ASSERT_EQ(run.exit_code, 0) << run.error;
+  EXPECT_EQ(read_file(alone), read_file(folder.results() / "one_rust_0" / "one.glb"));
+}
+
 TEST(Batch, tasks_share_the_jobs_and_each_is_in_one) {
   const BatchFolder folder;
   folder.read("assets = [\"DIR/1.glb\", \"DIR/2.glb\", \"DIR/3.glb\"]\nprompts = \"moss\"\n" + kSmall);

@@ -16,6 +16,7 @@
 #include "patina/nn/threads.h"
 #include "patina/pipeline/batch_record.h"
 #include "patina/pipeline/enhance.h"
+#include "patina/pipeline/options.h"
 #include "patina/pipeline/variants.h"
 #include "patina/report/batch_page.h"
 #include "patina/report/scale.h"
@@ -55,7 +56,25 @@ void write_picture(const BatchJob& job, const RunFolder& run) {
   if (only_edits(job.config) || !write("report", "report/rendered_")) write("detail", "detail/edited_");
 }
 
-// Jobs of one model after another, else in their order.
+// What the views of a job depend on: jobs with the same text have the same ones.
+std::string views_text(const BatchJob& job) {
+  Config config = job.config;
+  settle(config);
+  std::string text = fs::absolute(config.inputs.asset).string();
+  for (const Option& option : options())
+    if (option.parts & (kInputs | kRender)) text += "\n" + option.get(config).dump();
+  return text;
+}
+
+// The order in which views are made early that others wait for: of each asset one job, then of each the next.
+void alternate_views(const Batch& batch, std::vector<size_t>& order) {
+  std::map<std::string, size_t> counts;
+  std::map<size_t, size_t> rank;
+  for (const size_t i : order) rank[i] = counts[views_text(batch.jobs[i])]++;
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return rank[a] < rank[b]; });
+}
+
+// Jobs of one model after another.
 std::vector<size_t> in_order_of_models(const Batch& batch, size_t first, size_t count) {
   std::vector<const diffusion::ModelPaths*> models;
   std::vector<std::vector<size_t>> groups;
@@ -68,8 +87,27 @@ std::vector<size_t> in_order_of_models(const Batch& batch, size_t first, size_t 
     groups[group].push_back(i);
   }
   std::vector<size_t> order;
-  for (const std::vector<size_t>& group : groups) order.insert(order.end(), group.begin(), group.end());
+  for (std::vector<size_t>& group : groups) {
+    alternate_views(batch, group);
+    order.insert(order.end(), group.begin(), group.end());
+  }
   return order;
+}
+
+// Copies the views that another job has rendered; the render stage then finds them as its own. They are
+// rendered anew where someone works there, or where a picture was changed by hand.
+void take_views(const fs::path& rendered, RunFolder& run) {
+  if (run.stage("render")) return;
+  try {
+    const RunFolder from(rendered);
+    const StageRecord* record = from.stage("render");
+    if (!record || record->hashes.size() != record->outputs.size()) return;
+    for (size_t i = 0; i < record->outputs.size(); ++i)
+      if (hash_file(from.file(record->outputs[i])) != record->hashes[i]) return;
+    run.adopt_stage(from, "render");
+  } catch (const std::exception&) {
+    return;
+  }
 }
 
 // What the threads that work on a batch share.
@@ -83,6 +121,8 @@ class BatchRun {
   void work();
   void run_job(size_t index);
   void try_job(const BatchJob& job);
+  void note_views(const BatchJob& job);
+  fs::path folder_with_views(const BatchJob& job);
   void tell(const BatchJob& job, JobEvent event, const Failure& reason = {}) const {
     if (hooks_.on_job) hooks_.on_job(job, event, reason);
   }
@@ -94,17 +134,20 @@ class BatchRun {
   ModelShelf models_{/*keeps=*/true};
   std::vector<size_t> left_;  // jobs that are not done
   std::atomic<size_t> next_ = 0;
-  std::mutex mutex_;                    // guards what follows
-  std::map<size_t, FailedJob> failed_;  // by index
+  std::mutex mutex_;                          // guards what follows
+  std::map<size_t, FailedJob> failed_;        // by index
+  std::map<std::string, fs::path> rendered_;  // run folders that have views, by views_text()
   Clock::time_point index_written_ = Clock::now();
 };
 
 std::vector<FailedJob> BatchRun::run(const BatchOptions& options) {
   for (const size_t i : in_order_of_models(batch_, options.first, options.count))
-    if (is_done(batch_.jobs[i]))
+    if (is_done(batch_.jobs[i])) {
+      note_views(batch_.jobs[i]);
       tell(batch_.jobs[i], JobEvent::kReused);
-    else
+    } else {
       left_.push_back(i);
+    }
   // LibTorch keeps the number of its threads for each thread that calls it.
   const int network_threads = nn::num_network_threads();
   const size_t num_workers = std::min(left_.size(), static_cast<size_t>(std::max(1, options.at_once)));
@@ -120,6 +163,19 @@ std::vector<FailedJob> BatchRun::run(const BatchOptions& options) {
   std::vector<FailedJob> failed;
   for (auto& [index, job] : failed_) failed.push_back(std::move(job));
   return failed;
+}
+
+void BatchRun::note_views(const BatchJob& job) {
+  const std::string text = views_text(job);
+  const std::lock_guard lock(mutex_);
+  rendered_.emplace(text, run_folder_path(job.config));
+}
+
+fs::path BatchRun::folder_with_views(const BatchJob& job) {
+  const std::string text = views_text(job);
+  const std::lock_guard lock(mutex_);
+  const auto found = rendered_.find(text);
+  return found == rendered_.end() ? fs::path() : found->second;
 }
 
 void BatchRun::work() {
@@ -146,6 +202,7 @@ void BatchRun::run_job(size_t index) {
   tell(job, JobEvent::kStarted);
   try {
     try_job(job);
+    note_views(job);
     tell(job, JobEvent::kFinished);
   } catch (...) {
     const Failure failure = current_failure();
@@ -164,6 +221,7 @@ void BatchRun::try_job(const BatchJob& job) {
   try {
     write_record(job, {.state = JobState::kBegun, .reason = {}});
     const RunProgress progress = hooks_.progress_of ? hooks_.progress_of(job) : RunProgress{};
+    if (const fs::path rendered = folder_with_views(job); !rendered.empty()) take_views(rendered, run);
     const std::vector<fs::path> inputs = enhance(job.config, run, progress, models_);
     write_picture(job, run);
     write_record(job, {.state = JobState::kDone, .reason = {}, .seconds = seconds_since(start)}, key, inputs);
