@@ -24,11 +24,23 @@ constexpr int kRelightingSamples = 256;  // a pixel, at least: noise would count
 constexpr const char* kRelightings[] = {"st_fagans_interior_1k.hdr", "kiara_1_dawn_1k.hdr",
                                         "studio_small_03_1k.hdr"};
 
+constexpr Subject kSubjects[] = {
+    {"kettle", "examples/kettle.glb", 0},
+    {"bottle", "assets/WaterBottle/WaterBottle.gltf", 0},
+    {"car", "assets/ToyCar/ToyCar.gltf", 0},
+    {"suzanne", "assets/Suzanne/Suzanne.gltf", 0},
+    {"shoe", "assets/MaterialsVariantsShoe/MaterialsVariantsShoe.gltf", 0},
+};
+
+using enum asset::MapSlot;
+constexpr asset::MapSet kAll = asset::set_of({kBaseColor, kRoughness, kMetallic, kNormal});
 constexpr Ageing kAgeings[] = {
-    {"rough_relief", "examples/kettle.glb", 0, "stone/acg_rock037", 3, 0.6f, 1.0f, true, 0.8f, {}},
-    {"glossy_relief", "examples/kettle.glb", 0, "stone/acg_rock037", 3, 1.0f, 1.0f, true, {}, {}},
-    {"mossy_metal", "assets/Suzanne/Suzanne.gltf", 0, "moss/acg_moss001", 3, 1.0f, 0.4f, false, 0.35f, 1.0f},
-    {"rusty_paint", "examples/kettle.glb", 0, "rust/acg_rust004", 3, 1.0f, 0.4f, false, {}, {}},
+    {"rust", "rust/acg_rust004", 3, 3.0f, 0.4f, kAll, 0.0f, {}, {}, 0.0f},
+    {"moss", "moss/acg_moss001", 3, 1.0f, 0.4f, kAll, 0.0f, {}, 0.35f, 1.0f},
+    {"relief", "bark/acg_bark004", 3, 0.6f, 1.0f, asset::set_of({kNormal}), 0.0f, {}, 0.8f, 0.0f},
+    {"stone", "cracked/acg_rock023", 3, 1.5f, 1.0f, kAll, 0.0f, {}, {}, {}},
+    {"worn", "plaster/acg_plaster001", 3, 0.0f, 0.5f, asset::set_of({kRoughness}), 0.0f, {}, 0.2f, 0.0f},
+    {"tarnish", "metal/acg_metal036", 3, 1.0f, 0.6f, kAll, 1.0f, vec3(0.80f, 0.58f, 0.22f), 0.2f, 1.0f},
 };
 
 // A photographed material, laid out over the unit square of UVs, linear.
@@ -86,15 +98,24 @@ void lay_over(MaterialMaps& maps, const Photograph& photo, const Ageing& ageing)
     for (int x = 0; x < kTextureSize; ++x) {
       const vec2 uv = (vec2(x, y) + 0.5f) / static_cast<float>(kTextureSize);
       const float m = *mask.at(x, y);
-      const vec2 slope = slope_of(maps.normal.texels.rgb(x, y)) +
-                         m * ageing.slope * slope_of(asset::sample3(photo.normal, map_uv(photo.normal, uv)));
-      maps.normal.texels.set_rgb(x, y, glm::normalize(vec3(slope, 1.0f)));
-      if (ageing.relief_only) continue;
-      const vec3 color = asset::sample3(photo.base_color, map_uv(photo.base_color, uv));
-      maps.base_color.texels.set_rgb(x, y, glm::mix(maps.base_color.texels.rgb(x, y), color, m));
-      float& roughness = *maps.roughness.texels.at(x, y);
-      roughness = glm::mix(roughness, asset::sample1(photo.roughness, map_uv(photo.roughness, uv)), m);
-      *maps.metallic.texels.at(x, y) *= 1.0f - m;
+      if (has(ageing.maps, kBaseColor)) {
+        const vec3 color = asset::sample3(photo.base_color, map_uv(photo.base_color, uv));
+        maps.base_color.texels.set_rgb(x, y, glm::mix(maps.base_color.texels.rgb(x, y), color, m));
+      }
+      if (has(ageing.maps, kRoughness)) {
+        float& roughness = *maps.roughness.texels.at(x, y);
+        roughness = glm::mix(roughness, asset::sample1(photo.roughness, map_uv(photo.roughness, uv)), m);
+      }
+      if (has(ageing.maps, kMetallic)) {
+        float& metallic = *maps.metallic.texels.at(x, y);
+        metallic = glm::mix(metallic, ageing.metallic, m);
+      }
+      if (has(ageing.maps, kNormal)) {
+        const vec2 slope =
+            slope_of(maps.normal.texels.rgb(x, y)) +
+            m * ageing.slope * slope_of(asset::sample3(photo.normal, map_uv(photo.normal, uv)));
+        maps.normal.texels.set_rgb(x, y, glm::normalize(vec3(slope, 1.0f)));
+      }
     }
 }
 
@@ -141,7 +162,7 @@ std::vector<Worn> worn_by_pixels(const render::Scene& scene, std::span<const Mat
 // The pixels that show the aged material and count in the fit.
 std::vector<inverse::CachePixel> measured_pixels(const Aged& aged, const AgedOptions& options) {
   std::vector<bool> materials(aged.start.size(), false);
-  materials[static_cast<size_t>(aged.ageing->material)] = true;
+  materials[static_cast<size_t>(aged.subject->material)] = true;
   std::vector<Image> weights;
   for (const views::View& view : aged.views.views)
     weights.push_back(inverse::loss_weight(view.gbuffer, materials, options.fit.boundary_pixels));
@@ -186,24 +207,32 @@ double relit_psnr(const Aged& aged, const AgedOptions& options, const std::vecto
 
 }  // namespace
 
+std::span<const Subject> subjects() {
+  return kSubjects;
+}
 std::span<const Ageing> ageings() {
   return kAgeings;
 }
 
-Aged age_and_fit(const Ageing& ageing, const AgedOptions& options) {
+Aged age_and_fit(const Subject& subject, const Ageing& ageing, const AgedOptions& options) {
   Aged aged;
+  aged.subject = &subject;
   aged.ageing = &ageing;
-  const std::string file = ageing.asset;
+  const std::string file = subject.asset;
   aged.asset = asset::read_asset(file.starts_with("examples/") ? fs::path(file) : options.shared / file);
   aged.start = asset::resolve_materials(aged.asset);
-  MaterialMaps& clean = aged.start[static_cast<size_t>(ageing.material)];
+  MaterialMaps& clean = aged.start[static_cast<size_t>(subject.material)];
   const auto set_all = [](Map& map, const std::optional<float>& value) {
     if (value) std::fill(map.texels.pixels.begin(), map.texels.pixels.end(), *value);
   };
+  if (ageing.clean_color)
+    for (size_t i = 0; i < clean.base_color.texels.num_pixels(); ++i)
+      for (int c = 0; c < 3; ++c)
+        clean.base_color.texels.pixels[3 * i + static_cast<size_t>(c)] = (*ageing.clean_color)[c];
   set_all(clean.roughness, ageing.clean_roughness);
   set_all(clean.metallic, ageing.clean_metallic);
   aged.truth = aged.start;
-  lay_over(aged.truth[static_cast<size_t>(ageing.material)],
+  lay_over(aged.truth[static_cast<size_t>(subject.material)],
            read_photograph(options.shared / "materials" / ageing.photograph, ageing.repeats), ageing);
 
   views::OrbitOptions orbit;

@@ -12,17 +12,25 @@
 
 namespace patina::bench {
 
-/// How one asset ages.
+/// An asset that ages.
+struct Subject {
+  const char* name;
+  const char* asset;  // below the shared folder or, with "examples/", the repository
+  int material;       // the asset's material that ages
+};
+std::span<const Subject> subjects();
+
+/// How a material ages.
 struct Ageing {
   const char* name;
-  const char* asset;       // below the shared folder or, with "examples/", the repository
-  int material;            // the asset's material that ages
   const char* photograph;  // below shared/materials
   float repeats;           // of the photograph over the unit square of UVs
   float slope;             // factor on the photograph's slopes
   float covered;           // share of the texels that get it, in patches; 1: all
-  bool relief_only;        // colour, roughness and metalness stay the asset's
+  asset::MapSet maps;      // that the photograph changes; its metallic is `metallic`
+  float metallic;
   // What the clean material is set to first, where given.
+  std::optional<vec3> clean_color;  // linear
   std::optional<float> clean_roughness, clean_metallic;
 };
 std::span<const Ageing> ageings();
@@ -36,6 +44,7 @@ struct AgedOptions {
 };
 
 struct Aged {
+  const Subject* subject = nullptr;
   const Ageing* ageing = nullptr;
   asset::Asset asset;
   std::vector<asset::MaterialMaps> start, truth;
@@ -45,7 +54,7 @@ struct Aged {
   double fit_seconds = 0;
 };
 /// Composes the truth, renders it and fits.
-Aged age_and_fit(const Ageing& ageing, const AgedOptions& options);
+Aged age_and_fit(const Subject& subject, const Ageing& ageing, const AgedOptions& options);
 
 /// How near maps are to the truth, over the pixels of all views that show the aged material and count in the
 /// fit; maps are averaged over each pixel first, since no view shows finer.

@@ -191,6 +191,26 @@ json to_json(const bench::AgedErrors& errors) {
           {"metallic_right", errors.metallic_right},   {"relit_psnr", errors.relit_psnr}};
 }
 
+json run_ageing(const bench::Subject& subject, const bench::Ageing& ageing, const bench::AgedOptions& options,
+                const fs::path& picture) {
+  const bench::Aged aged = bench::age_and_fit(subject, ageing, options);
+  const bench::AgedErrors start = aged_errors(aged, options, aged.start),
+                          found = aged_errors(aged, options, aged.fit.maps);
+  std::printf(
+      "%-8s %-8s normals %.1f -> %.1f deg (correlation %.2f), base colour %.1f -> %.1f dB, roughness %.3f -> "
+      "%.3f, metallic right %.2f, relit %.2f -> %.2f dB, %.1f s\n",
+      subject.name, ageing.name, start.normal_degrees, found.normal_degrees, found.normal_correlation,
+      start.base_color_psnr, found.base_color_psnr, start.roughness_mae, found.roughness_mae,
+      found.metallic_right, start.relit_psnr, found.relit_psnr, aged.fit_seconds);
+  std::fflush(stdout);
+  fs::create_directories(picture.parent_path());
+  write_image(picture, aged_picture(aged, options));
+  return {{"start", to_json(start)},
+          {"found", to_json(found)},
+          {"fit_psnr", aged.fit.psnr},
+          {"seconds", aged.fit_seconds}};
+}
+
 void run_aged(const Options& options) {
   bench::AgedOptions aged_options;
   aged_options.shared = options.shared;
@@ -198,26 +218,13 @@ void run_aged(const Options& options) {
   aged_options.samples = options.recovery.samples_per_pixel;
   aged_options.fit = options.recovery.fit;
   json all = json::array();
-  for (const bench::Ageing& ageing : bench::ageings()) {
-    if (!options.only.empty() && options.only != ageing.name) continue;
-    const bench::Aged aged = bench::age_and_fit(ageing, aged_options);
-    const bench::AgedErrors start = aged_errors(aged, aged_options, aged.start),
-                            found = aged_errors(aged, aged_options, aged.fit.maps);
-    std::printf(
-        "%-14s normals %.1f -> %.1f deg (correlation %.2f), base colour %.1f -> %.1f dB, roughness %.3f -> "
-        "%.3f, metallic right %.2f, relit %.2f -> %.2f dB, %.1f s\n",
-        ageing.name, start.normal_degrees, found.normal_degrees, found.normal_correlation,
-        start.base_color_psnr, found.base_color_psnr, start.roughness_mae, found.roughness_mae,
-        found.metallic_right, start.relit_psnr, found.relit_psnr, aged.fit_seconds);
-    std::fflush(stdout);
-    all.push_back({{"name", ageing.name},
-                   {"start", to_json(start)},
-                   {"found", to_json(found)},
-                   {"fit_psnr", aged.fit.psnr},
-                   {"seconds", aged.fit_seconds}});
-    fs::create_directories(options.pictures);
-    write_image(options.pictures / (std::string(ageing.name) + ".png"), aged_picture(aged, aged_options));
-  }
+  for (const bench::Subject& subject : bench::subjects())
+    for (const bench::Ageing& ageing : bench::ageings()) {
+      const std::string name = std::string(subject.name) + "_" + ageing.name;
+      if (!options.only.empty() && name.find(options.only) == std::string::npos) continue;
+      all.push_back(run_ageing(subject, ageing, aged_options, options.pictures / (name + ".png")));
+      all.back()["name"] = name;
+    }
   if (all.empty()) throw std::runtime_error("no ageing is called " + options.only);
   write_file(options.out, all.dump(1) + "\n");
 }

@@ -12,9 +12,7 @@
 #include "patina/base/parallel.h"
 #include "patina/base/random.h"
 #include "patina/image/color.h"
-#include "patina/inverse/edited_pixels.h"
 #include "patina/inverse/fit.h"
-#include "patina/inverse/fit_views.h"
 #include "patina/inverse/loss.h"
 #include "patina/inverse/unseen.h"
 #include "recovery/recovery.h"
@@ -23,38 +21,6 @@
 
 namespace patina::test {
 namespace {
-
-// A world whose target is its own render; materials then start flat.
-struct Task {
-  World world;
-  views::ViewSet views;
-  std::vector<Image> edited;
-};
-Task make_task(
-    int resolution = 40, const std::function<void(asset::Map&)>& lay = [](asset::Map&) {}) {
-  Task task{make_world(Lighting::kConstant, 8, resolution), {}, {}};
-  for (auto& maps : task.world.maps)
-    for (asset::Map* map : {&maps.base_color, &maps.roughness, &maps.metallic, &maps.normal}) lay(*map);
-  task.world.scene.set_asset_materials(task.world.maps);
-  task.views = view_of(task.world);
-  render::PathOptions path;
-  path.samples_per_pixel = 64;
-  task.edited.push_back(tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f));
-  auto flat = task.world.maps;
-  for (auto& maps : flat) {
-    maps.base_color.texels = Image(8, 8, 3, 0.5f);
-    maps.roughness.texels = Image(1, 1, 1, 0.5f);
-  }
-  task.world.scene.set_asset_materials(flat);
-  return task;
-}
-inverse::FitOptions quick() {
-  inverse::FitOptions options;
-  options.iterations = 12;
-  options.light_samples = 16;
-  options.max_depth = 2;
-  return options;
-}
 
 std::vector<float> all_texels(const inverse::FitResult& result) {
   std::vector<float> values;
@@ -279,85 +245,6 @@ TEST(fit, changes_only_the_chosen_materials_and_maps) {
   EXPECT_EQ(result.maps[0].normal.texels.pixels, start[0].normal.texels.pixels);
   EXPECT_EQ(result.maps[1].base_color.texels.pixels, start[1].base_color.texels.pixels);
   EXPECT_FALSE(result.changed[1].any());
-}
-
-TEST(fit, a_view_that_was_not_edited_changes_nothing) {
-  Task task = make_task();
-  const auto start = task.world.scene.materials();
-  render::PathOptions path;
-  path.samples_per_pixel = 8;  // noise is no edit either
-  task.edited = {tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f)};
-  const auto largest_change = [&](std::span<const Image> clean) {
-    const auto result = inverse::fit_materials(
-        task.world.scene, {.views = task.views, .edited = task.edited, .clean = clean}, quick(), {}, {});
-    float largest = 0;
-    for (size_t m = 0; m < result.maps.size(); ++m)
-      for (const asset::MapSlotRow& row : asset::kMapSlots) {
-        const asset::Map& map = asset::slot_map(result.maps[m], row.slot);
-        const Image before =
-            asset::resized(asset::slot_map(start[m], row.slot), map.texels.width, map.texels.height).texels;
-        for (size_t i = 0; i < before.pixels.size(); ++i)
-          largest = std::max(largest, std::abs(map.texels.pixels[i] - before.pixels[i]));
-      }
-    return largest;
-  };
-  const float with_clean = largest_change(task.edited), without = largest_change({});
-  EXPECT_LT(with_clean, 1e-6f);  // normals are scaled to length one
-  EXPECT_GT(without, 0.08f);     // which the errors of the light cache would do
-}
-
-TEST(fit, counts_pixels_less_that_the_light_cache_shows_wrongly) {
-  Task task = make_task();
-  const Image& edited = task.edited[0];
-  inverse::LightCache cache;
-  cache.pixels = inverse::select_pixels(task.views, {{inverse::loss_target(edited)}},
-                                        {{Image(edited.width, edited.height, 1, 1.0f)}});
-  // One sample a pixel: right, a twentieth off, far off, and so on.
-  constexpr float kErrors[] = {0.0f, 0.05f, 0.5f}, kWeights[] = {1.0f, 0.5f, 0.0f};
-  std::vector<vec3> of_samples;
-  cache.first_sample.push_back(0);
-  for (size_t i = 0; i < cache.pixels.size(); ++i) {
-    const vec3 wrong = cache.pixels[i].target * (1.0f - kErrors[i % 3]);
-    of_samples.push_back(wrong / (1.0f - wrong));
-    cache.samples.emplace_back().pixel = static_cast<uint32_t>(i);
-    cache.first_sample.push_back(static_cast<uint32_t>(i + 1));
-  }
-  inverse::calibrate(cache, of_samples, task.edited, 1.0f);
-  int num_lit = 0;
-  for (size_t i = 0; i < cache.pixels.size(); ++i) {
-    if (max_component(cache.pixels[i].target) < 0.2f) continue;  // of dark pixels, errors count less
-    EXPECT_NEAR(cache.pixels[i].weight, kWeights[i % 3], 0.15f);
-    ++num_lit;
-  }
-  EXPECT_GT(num_lit, 100);
-}
-
-TEST(fit, knows_which_half_of_a_view_was_edited) {
-  Task task = make_task();
-  const std::vector<Image> clean = task.edited;
-  Image& edited = task.edited[0];
-  const int middle = edited.width / 2;
-  for (int y = 0; y < edited.height; ++y)
-    for (int x = 0; x < middle; ++x) edited.set_rgb(x, y, 0.8f * edited.rgb(x, y));
-  inverse::LightCache cache;
-  cache.pixels = inverse::select_pixels(task.views, {{inverse::loss_target(edited)}},
-                                        {{Image(edited.width, edited.height, 1, 1.0f)}});
-  const std::vector<float> shares = inverse::edited_pixels(cache, task.views, clean);
-  int num_edited = 0, num_kept = 0;
-  for (size_t i = 0; i < shares.size(); ++i) {
-    const int x = cache.pixels[i].x;
-    if (x >= middle - 1 && x <= middle) continue;  // sees the other half as well
-    const vec3 before = clean[0].rgb(x, cache.pixels[i].y);
-    if (x > middle) {
-      EXPECT_EQ(shares[i], 0.0f);
-      ++num_kept;
-    } else if (max_component(before) > 0.1f) {
-      EXPECT_EQ(shares[i], 1.0f);
-      ++num_edited;
-    }
-  }
-  EXPECT_GT(num_edited, 100);
-  EXPECT_GT(num_kept, 100);
 }
 
 TEST(fit, leaves_surface_that_no_view_saw_as_it_was) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "patina/base/random.h"
+#include "patina/image/color.h"
 #include "patina/inverse/seen_points.h"
+#include "patina/render/path_tracer.h"
 
 namespace patina::test {
 namespace {
@@ -138,6 +140,31 @@ inverse::LightCache traced_cache(const World& world, const views::ViewSet& views
   inverse::make_samples(cache, world.scene, world.maps, points);
   inverse::trace_light(cache, world.scene, world.scene.asset_materials(), views, options, {});
   return cache;
+}
+
+Task make_task(int resolution, const std::function<void(asset::Map&)>& lay) {
+  Task task{make_world(Lighting::kConstant, 8, resolution), {}, {}};
+  for (auto& maps : task.world.maps)
+    for (asset::Map* map : {&maps.base_color, &maps.roughness, &maps.metallic, &maps.normal}) lay(*map);
+  task.world.scene.set_asset_materials(task.world.maps);
+  task.views = view_of(task.world);
+  render::PathOptions path;
+  path.samples_per_pixel = 64;
+  task.edited.push_back(tone_map(render::render(task.world.scene, task.world.camera, path).radiance, 0.0f));
+  auto flat = task.world.maps;
+  for (auto& maps : flat) {
+    maps.base_color.texels = Image(8, 8, 3, 0.5f);
+    maps.roughness.texels = Image(1, 1, 1, 0.5f);
+  }
+  task.world.scene.set_asset_materials(flat);
+  return task;
+}
+inverse::FitOptions quick() {
+  inverse::FitOptions options;
+  options.iterations = 12;
+  options.light_samples = 16;
+  options.max_depth = 2;
+  return options;
 }
 
 }  // namespace patina::test

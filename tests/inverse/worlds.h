@@ -2,6 +2,11 @@
 // under the kinds of light that a scene can have.
 #pragma once
 
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "patina/inverse/fit_options.h"
 #include "patina/inverse/light_cache.h"
 #include "patina/render/scene.h"
 #include "patina/views/view_set.h"
@@ -33,5 +38,18 @@ std::vector<inverse::CachePixel> all_pixels(const views::ViewSet& views);
 /// The light cache of all these pixels.
 inverse::LightCache traced_cache(const World& world, const views::ViewSet& views,
                                  const inverse::CacheOptions& options);
+
+/// A world whose target is its own render; base colour and roughness then start flat. `lay` changes every map
+/// before.
+struct Task {
+  World world;
+  views::ViewSet views;
+  std::vector<Image> edited;
+};
+Task make_task(
+    int resolution = 40, const std::function<void(asset::Map&)>& lay = [](asset::Map&) {});
+
+/// Options of a fit that takes a second.
+inverse::FitOptions quick();
 
 }  // namespace patina::test

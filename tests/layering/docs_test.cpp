@@ -211,8 +211,9 @@ TEST(Docs, files_named_in_backticks_exist) {
 // An option that was renamed or removed leaves the pages at once. Values and meanings are not checked.
 TEST(Docs, options_named_exist) {
   static const std::regex option(R"(--[a-z][a-z0-9_-]+)");
-  static const std::set<std::string> of_other_tools{"--build",  "--gtest_filter", "--help",   "--install",
-                                                    "--prefix", "--parallel",     "--preset", "--target"};
+  static const std::set<std::string> of_other_tools{
+      "--build",    "--gtest_filter", "--help",         "--install", "--prefix",
+      "--parallel", "--preset",       "--sshloginfile", "--target",  "--workdir"};
   const std::string sources = program_sources();
   std::set<std::string> known = of_other_tools;
   int num_checked = 0;

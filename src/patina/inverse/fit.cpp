@@ -7,6 +7,7 @@
 #include "patina/base/clock.h"
 #include "patina/base/error.h"
 #include "patina/inverse/edited_pixels.h"
+#include "patina/inverse/first_guess.h"
 #include "patina/inverse/fit_result.h"
 #include "patina/inverse/fit_setup.h"
 #include "patina/inverse/fit_slots.h"
@@ -99,7 +100,8 @@ void Fit::trace(int generation) {
 }
 
 // The first light falls on the starting maps. What it shows of them tells, beside the clean views, how far
-// off the cache is, and beside the edited ones, which texels are of one kind.
+// off the cache is, and beside the edited ones, which texels are of one kind and which kinds turned from
+// metal into something else.
 void Fit::learn_from_start() {
   const std::vector<vec3> clean = evaluator_.shade_samples(cache_);
   std::vector<float> edited(cache_.pixels.size(), 1.0f);
@@ -109,10 +111,38 @@ void Fit::learn_from_start() {
   }
   for (size_t f = 0; f < state_.fitted.size(); ++f) {
     FittedMap& map = state_.fitted[f];
-    const SampleTaps& taps = evaluator_.taps_of(f);
-    map.field.edited = edited_texels(cache_, edited, taps, map.evidence.width, map.evidence.height);
+    map.field.edited =
+        edited_texels(cache_, edited, evaluator_.taps_of(f), map.evidence.width, map.evidence.height);
+  }
+  learn_kinds(clean);
+}
+
+void Fit::learn_kinds(std::span<const vec3> clean_radiance) {
+  const bool guesses = has(options_.maps, asset::MapSlot::kBaseColor) &&
+                       has(options_.maps, asset::MapSlot::kRoughness) &&
+                       has(options_.maps, asset::MapSlot::kMetallic);
+  const SampleTaps* learned = nullptr;  // whose kinds and changes these are: maps of one layout share them
+  std::optional<MaterialKinds> kinds;
+  std::vector<std::optional<KindChange>> changes;
+  for (size_t f = 0; f < state_.fitted.size(); ++f) {
+    FittedMap& map = state_.fitted[f];
     if (!fit_slot(map.slot).follows_kinds) continue;
-    map.field.kinds = MaterialKinds(cache_, clean, gain_, taps.samples).shares(taps);
+    const SampleTaps& taps = evaluator_.taps_of(f);
+    if (learned != &taps) {
+      learned = &taps;
+      kinds.emplace(cache_, clean_radiance, gain_, taps.samples);
+      changes.clear();
+      if (guesses)
+        changes = guess_changes(cache_, scene_.bsdf_model(), gain_, taps, kinds->kinds_of(taps.samples),
+                                kinds->size());
+    }
+    map.field.kinds = kinds->shares(taps);
+    std::vector<float>& of_kinds = map.field.levels.back().pixels;
+    for (size_t k = 0; k < changes.size(); ++k)
+      if (changes[k])
+        of_kinds[k] = map.slot == asset::MapSlot::kMetallic ? changes[k]->metallic : changes[k]->roughness;
+    compose(map.field);
+    map.field.guess = map.field.delta.texels;
   }
 }
 

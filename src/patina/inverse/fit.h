@@ -48,6 +48,7 @@ class Fit {
  private:
   void trace(int generation);
   void learn_from_start();
+  void learn_kinds(std::span<const vec3> clean_radiance);
   float evaluate() { return evaluator_.evaluate(cache_); }
 
   const render::Scene& scene_;

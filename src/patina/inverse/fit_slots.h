@@ -14,7 +14,8 @@ namespace patina::inverse {
 /// squared coefficient at the finest level, in units of one fully weighted pixel's loss, and `coarser` times
 /// that a level up, and so on: where the views say little, the smoother answer wins, while large areas move
 /// freely. Coefficients far beyond `knee` cost only linearly, so that true edges stay sharp. `change` is the
-/// cost of the squared change itself, which holds what the views leave undecided.
+/// cost of the squared change itself, less the one that the fit began with: it holds what the views leave
+/// undecided.
 struct Prior {
   float detail, coarser, knee, change;
 };

@@ -98,7 +98,10 @@ class Problem {
                           texels);
       const float change = fit_slot(map.slot).prior.change;
       const std::vector<float>& delta = map.field.delta.texels.pixels;
-      each_number(delta.size(), [&](size_t i) { texels.pixels[i] -= change * delta[i]; });
+      const std::vector<float>& guess = map.field.guess.pixels;
+      each_number(delta.size(), [&](size_t i) {
+        texels.pixels[i] -= change * (guess.empty() ? delta[i] : delta[i] - guess[i]);
+      });
       out[f] = restrict_to_levels(map.field, std::move(texels));
       for (size_t level = 0; level < out[f].size(); ++level) {
         std::vector<float>& to = out[f][level].pixels;
@@ -263,7 +266,9 @@ double objective(const FitState& state, const Evaluator& evaluator) {
   }
   for (const FittedMap& map : state.fitted) {
     const Prior& prior = fit_slot(map.slot).prior;
-    for (const float delta : map.field.delta.texels.pixels) sum += 0.5 * prior.change * square(delta);
+    const std::vector<float>&delta = map.field.delta.texels.pixels, &guess = map.field.guess.pixels;
+    for (size_t i = 0; i < delta.size(); ++i)
+      sum += 0.5 * prior.change * square(guess.empty() ? delta[i] : delta[i] - guess[i]);
     const double knee2 = square(double{prior.knee});
     for (size_t level = 0; level < map.field.levels.size(); ++level) {
       const double detail = level_cost(prior, level, map.field.levels.size());

@@ -110,6 +110,13 @@ void MaterialKinds::find_centres(std::span<const uint32_t> samples) {
   }
 }
 
+std::vector<uint16_t> MaterialKinds::kinds_of(std::span<const uint32_t> samples) const {
+  std::vector<uint16_t> kinds;
+  for (const uint32_t sample : samples)
+    kinds.push_back(static_cast<uint16_t>(nearest<Feature>(centres_, features_[sample])));
+  return kinds;
+}
+
 KindShares MaterialKinds::shares(const SampleTaps& taps) const {
   KindShares out;
   const size_t num_texels = taps.texel_begin.size() - 1;

@@ -21,6 +21,11 @@ class MaterialKinds {
   MaterialKinds(const LightCache& cache, std::span<const vec3> clean_radiance, float gain,
                 std::span<const uint32_t> samples);
 
+  size_t size() const { return centres_.size(); }
+
+  /// The kind that each sample belongs to most.
+  std::vector<uint16_t> kinds_of(std::span<const uint32_t> samples) const;
+
   /// Of each texel of a map that is seen through `taps`.
   KindShares shares(const SampleTaps& taps) const;
 

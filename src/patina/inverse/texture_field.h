@@ -40,6 +40,7 @@ struct TextureField {
   // all, upsampled, and of each texel's kinds, times `edited`.
   std::vector<Image> levels;
   KindShares kinds;
+  Image guess;   // [h,w,C] the change with which the fit began (first_guess.h); empty: none
   Image edited;  // [h,w,1] share of the change that a texel takes, 0 where nothing was edited; empty: all
 };
 
