@@ -145,7 +145,7 @@ std::vector<std::optional<KindChange>> guess_changes(const LightCache& cache, re
         least[k] < kMuchBetter * of_start[k] && of_start[k] - least[k] > kLeastGain * starts[k].weight;
     const double roughness = best[k].roughness - starts[k].roughness,
                  metallic = best[k].metallic - starts[k].metallic;
-    if (is_better && std::abs(metallic) > 0.5)
+    if (is_better && metallic < -0.5)
       changes[k] = {static_cast<float>(roughness), static_cast<float>(metallic)};
   }
   return changes;

@@ -21,7 +21,8 @@ struct KindChange {
   float roughness = 0, metallic = 0;
 };
 
-/// For each kind that became a metal or ceased to be one, how its values change; none for the others.
+/// For each kind that was a metal and is none any more, how its values change; none for the others. (What an
+/// edit makes shiny is no metal yet: models paint highlights on plastic too.)
 /// `cache`: with the light and the calibration of the starting maps. `taps`: of a map of the material.
 /// `kinds` [taps.samples], each below `num_kinds`. `gain` = 2^exposure_ev.
 std::vector<std::optional<KindChange>> guess_changes(const LightCache& cache, render::BsdfModel model,
