@@ -315,7 +315,8 @@ int main(int argc, char** argv) {
   program.add_option("--iterations", recovery.fit.iterations, "Of a fit")
       ->check(tools::whole_number(1))
       ->capture_default_str();
-  program.add_option("--only", options.only, "Name of one asset, or of one ageing");
+  program.add_option("--only", options.only,
+                     "Name of one asset, or part of the names of ageings: kettle_rust");
   program.add_option("--out", options.out, "JSON to write; known assets in it are left out")
       ->capture_default_str();
   program.add_option("--pictures", options.pictures, "Folder of the strips")->capture_default_str();

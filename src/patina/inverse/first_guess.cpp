@@ -126,6 +126,9 @@ std::vector<std::optional<KindChange>> guess_changes(const LightCache& cache, re
                                                      std::span<const uint16_t> kinds, size_t num_kinds) {
   const std::vector<Row> rows = chosen_rows(cache, taps, kinds);
   const std::vector<KindStart> starts = starts_of(cache, rows, num_kinds);
+  std::vector<std::optional<KindChange>> changes(num_kinds);
+  if (std::none_of(starts.begin(), starts.end(), [](const KindStart& start) { return start.metallic > 0.5; }))
+    return changes;
   const auto losses = [&](const std::optional<Guess>& guess) {
     return losses_of(rows, lines_of(cache, model, gain, rows, guess), taps.texel_begin.size() - 1, num_kinds);
   };
@@ -139,7 +142,6 @@ std::vector<std::optional<KindChange>> guess_changes(const LightCache& cache, re
         if (loss[k] < least[k]) least[k] = loss[k], best[k] = {roughness, metallic};
     }
 
-  std::vector<std::optional<KindChange>> changes(num_kinds);
   for (size_t k = 0; k < num_kinds; ++k) {
     const bool is_better =
         least[k] < kMuchBetter * of_start[k] && of_start[k] - least[k] > kLeastGain * starts[k].weight;
